@@ -1,0 +1,42 @@
+# Every target does its own set-up: a virtual environment in .venv with the exact versions of constraints.txt.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test lint types unit wheel bars clean
+
+demo: $(READY)  ## recover a reward on FrozenLake 8x8, retrain PPO on it, print the report
+	$(BIN)/python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --out runs/demo
+
+test: lint types unit wheel  ## everything CI checks
+
+lint: $(READY)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+
+types: $(READY)
+	$(BIN)/pyright
+
+unit: $(READY)
+	$(BIN)/python -m pytest
+
+wheel: $(READY)
+	rm -rf dist
+	$(BIN)/python -m build --wheel --outdir dist . > /dev/null
+	$(BIN)/check-wheel-contents dist
+
+bars: $(READY)  ## the measured bars: speed, memory, retraining on every environment (about 10 minutes)
+	$(BIN)/python scripts/measure_speed.py
+	$(BIN)/python scripts/measure_retraining.py
+
+# torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.
+$(READY): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt torch
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) dist runs .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,105 @@
+"""Every error that irl_gym raises on purpose.
+
+IrlGymError
+├── InvalidInput (also a ValueError)
+│   ├── InvalidMDP             a table that is not a finite MDP
+│   ├── InvalidDiscount        gamma outside (0, 1)
+│   ├── InvalidPolicy          wrong shape, action out of range, rows that do not sum to 1
+│   ├── InvalidReward          wrong shape, NaN, a file that holds no reward
+│   ├── InvalidParameter       a hyper-parameter outside its range
+│   ├── UnknownObservation     an observation that the state index does not hold
+│   └── InvalidDemonstrations  episodes that no environment could have produced
+├── UnknownEnvironment         an id that is not registered; the closest names are offered
+├── NotDiscrete                a space with infinitely many elements where finitely many are needed
+├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
+├── TableMismatch              `env.step` did what the table says is impossible
+├── DegenerateExpert           equation (4) of Ng & Russell leaves no reward that prefers the expert's actions
+├── SolverError
+│   ├── SolverTimeout          the time limit was reached before an answer
+│   └── SolverFailed           no solver gave an answer
+├── DatasetMismatch            a dataset recorded in another environment
+├── DatasetExists              a Minari id that is taken
+└── RunConflict                a run folder that holds another run
+
+A message reads `what, with the value: what was expected. The mend.`
+"""
+
+
+class IrlGymError(Exception):
+    """Base class: `except IrlGymError` catches everything this library raises on purpose."""
+
+
+class InvalidInput(IrlGymError, ValueError):
+    """An argument that cannot be right."""
+
+
+class InvalidMDP(InvalidInput):
+    """A transition table that is not a finite MDP."""
+
+
+class InvalidDiscount(InvalidInput):
+    """A discount outside the open interval (0, 1)."""
+
+
+class InvalidPolicy(InvalidInput):
+    """A policy of the wrong shape, with actions out of range or probabilities that do not sum to 1."""
+
+
+class InvalidReward(InvalidInput):
+    """A reward of the wrong shape, with NaN, or a file that holds no reward."""
+
+
+class InvalidParameter(InvalidInput):
+    """A hyper-parameter outside its range."""
+
+
+class UnknownObservation(InvalidInput):
+    """An observation that the state index does not hold."""
+
+
+class InvalidDemonstrations(InvalidInput):
+    """Episodes that no environment could have produced."""
+
+
+class UnknownEnvironment(IrlGymError):
+    """An environment id that is not registered."""
+
+
+class NotDiscrete(IrlGymError):
+    """A space with infinitely many elements where finitely many are needed."""
+
+
+class NotTabular(IrlGymError):
+    """An environment that publishes no table, or whose table is not the whole truth."""
+
+
+class TableMismatch(IrlGymError):
+    """`env.step` did what the table says is impossible."""
+
+
+class DegenerateExpert(IrlGymError):
+    """No reward prefers the expert's actions: equation (4) holds only with every margin zero."""
+
+
+class SolverError(IrlGymError):
+    """A linear program without an answer."""
+
+
+class SolverTimeout(SolverError):
+    """The time limit was reached before an answer."""
+
+
+class SolverFailed(SolverError):
+    """No solver gave an answer."""
+
+
+class DatasetMismatch(IrlGymError):
+    """A dataset that was recorded in another environment."""
+
+
+class DatasetExists(IrlGymError):
+    """A Minari dataset id that is taken."""
+
+
+class RunConflict(IrlGymError):
+    """A run folder that holds another run."""

@@ -1,0 +1,52 @@
+"""Shape annotations are checked while the tests run; hypothesis is seeded and has no clock."""
+
+import jaxtyping
+
+jaxtyping.install_import_hook("irl_gym", "typechecker.check")
+
+import gymnasium as gym  # noqa: E402  (nothing of irl_gym may be imported before the hook)
+import hypothesis  # noqa: E402
+import pytest  # noqa: E402
+
+hypothesis.settings.register_profile("irl_gym", deadline=None, derandomize=True, max_examples=25, database=None)
+hypothesis.settings.load_profile("irl_gym")
+
+
+def pytest_configure(config):
+    # Gymnasium's Tuple and Dict spaces derive from typing.Sequence and typing.Mapping, which beartype frowns at.
+    config.addinivalue_line("filterwarnings", "ignore::beartype.roar.BeartypeDecorHintPep585DeprecationWarning")
+
+
+KWARGS = {
+    "FrozenLake 4x4 slippery": ("FrozenLake-v1", {"map_name": "4x4", "is_slippery": True}),
+    "FrozenLake 4x4": ("FrozenLake-v1", {"map_name": "4x4", "is_slippery": False}),
+    "FrozenLake 8x8 slippery": ("FrozenLake-v1", {"map_name": "8x8", "is_slippery": True}),
+    "FrozenLake 8x8": ("FrozenLake-v1", {"map_name": "8x8", "is_slippery": False}),
+    "CliffWalking": ("CliffWalking-v1", {}),
+    "CliffWalking slippery": ("CliffWalkingSlippery-v1", {}),
+    "Taxi": ("Taxi-v4", {}),
+}
+
+
+@pytest.fixture(scope="session")
+def toy_text():
+    """Tables of Gymnasium's environments with gamma 0.99, by the names of references.md; each made once, unchecked."""
+    from irl_gym.tabulate import tabulate  # here, so that the filter of pytest_configure is in force
+
+    made = {}
+
+    def get(name):
+        if name not in made:
+            env_id, kwargs = KWARGS[name]
+            made[name] = tabulate(gym.make(env_id, **kwargs), gamma=0.99, check_steps=0)
+        return made[name]
+
+    return get
+
+
+@pytest.fixture
+def unchecked():
+    """Annotations are not checked in this test, so that the library's own check of an argument is reached."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)

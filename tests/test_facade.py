@@ -1,0 +1,27 @@
+"""The facade: few names, nothing heavy until it is used."""
+
+import subprocess
+import sys
+
+import irl_gym
+
+HEAVY = ("torch", "cvxpy", "minari", "matplotlib", "ray", "stable_baselines3", "gymnasium", "scipy")
+
+
+def test_every_name_of_the_facade_is_there():
+    assert all(getattr(irl_gym, name) is not None for name in irl_gym.__all__)
+
+
+def test_the_facade_has_fewer_than_30_names():
+    assert len(irl_gym.__all__) < 30
+
+
+def test_importing_loads_nothing_heavy():
+    code = f"import sys, irl_gym; print([name for name in {HEAVY} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_importing_takes_less_than_a_third_of_a_second():
+    code = "import time; start = time.perf_counter(); import irl_gym; print(time.perf_counter() - start)"
+    made = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout) for _ in range(3)]
+    assert min(made) < 0.3

@@ -1,0 +1,123 @@
+"""Policies: what acts.
+
+Three ways to write a tabular policy, and everything that takes one takes all three:
+    (S,)   int      the action of each state
+    (S, A) float    a distribution over actions in each state
+    (S, A) bool     a set of actions that are equally good in each state
+Axes: S states, A actions.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from irl_gym._typing import ActionSets, Matrix
+from irl_gym.errors import InvalidPolicy
+from irl_gym.states import StateIndex
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Whatever has Stable-Baselines3's `predict`."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Map an observation (or a batch) to an action (or a batch) and the next hidden state."""
+        ...
+
+
+def as_distribution(policy: Any, n_states: int, n_actions: int) -> Matrix:
+    """Write any tabular policy as a distribution: (S, A), rows that sum to 1.
+
+    A set of actions becomes the uniform distribution over it.
+
+    Raises:
+        InvalidPolicy: wrong shape, action out of range, empty set, probabilities negative, NaN or not summing to 1.
+    """
+    array = np.asarray(policy)
+    if array.shape == (n_states,) and array.dtype.kind in "iu":
+        return _one_hot(array, n_actions)
+    if array.shape != (n_states, n_actions):
+        raise InvalidPolicy(
+            f"policy has shape {array.shape} and dtype {array.dtype}: expected ({n_states},) integer actions, or "
+            f"({n_states}, {n_actions}) probabilities or booleans. Give one entry for each state."
+        )
+    if array.dtype == bool:
+        empty = np.flatnonzero(~array.any(axis=1))
+        if empty.size:
+            raise InvalidPolicy(f"policy[s={empty[0]}] is an empty set: expected at least one action in each state.")
+        return array / array.sum(axis=1, keepdims=True)
+    if array.dtype.kind != "f":
+        raise InvalidPolicy(
+            f"policy has dtype {array.dtype} and shape {array.shape}: an (S, A) policy is float (probabilities) or "
+            "bool (a set). Convert it, for example with `policy.astype(bool)`."
+        )
+    return _checked_probabilities(array)
+
+
+def _one_hot(actions: np.ndarray, n_actions: int) -> np.ndarray:
+    wrong = np.flatnonzero((actions < 0) | (actions >= n_actions))
+    if wrong.size:
+        s = wrong[0]
+        raise InvalidPolicy(f"policy[s={s}] is action {actions[s]}: expected an action from 0 to {n_actions - 1}.")
+    distribution = np.zeros((actions.size, n_actions))
+    distribution[np.arange(actions.size), actions] = 1.0
+    return distribution
+
+
+def _checked_probabilities(array: np.ndarray) -> np.ndarray:
+    wrong = np.argwhere(~(array >= 0))  # catches NaN too
+    if wrong.size:
+        s, a = wrong[0]
+        raise InvalidPolicy(f"policy[s={s}, a={a}] is {array[s, a]}: a probability is at least 0.")
+    sums = array.sum(axis=1)
+    wrong = np.flatnonzero(np.abs(sums - 1) > 1e-8)
+    if wrong.size:
+        raise InvalidPolicy(f"policy[s={wrong[0]}] sums to {sums[wrong[0]]:.9g}: each row must sum to 1. Normalise it.")
+    return array.astype(np.float64)
+
+
+def support(policy: Any, n_states: int, n_actions: int) -> ActionSets:
+    """The actions that a policy takes with positive probability: (S, A) booleans."""
+    return as_distribution(policy, n_states, n_actions) > 0
+
+
+@dataclass(frozen=True, eq=False)
+class TabularPolicy:
+    """A table of action probabilities that acts on observations, with Stable-Baselines3's `predict`."""
+
+    probabilities: Matrix
+    """(S, A), rows sum to 1."""
+    states: StateIndex
+    """Turns observations into rows."""
+    seed: int = 0
+    """Of the generator that `predict(deterministic=False)` draws from."""
+
+    def __post_init__(self) -> None:
+        checked = as_distribution(self.probabilities, self.states.n_states, np.shape(self.probabilities)[-1])
+        checked.setflags(write=False)
+        object.__setattr__(self, "probabilities", checked)
+        object.__setattr__(self, "_rng", np.random.default_rng(self.seed))
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self.probabilities, self.states, self.seed)
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """The action for one observation, or an array of actions for a batch; the hidden state is passed through.
+
+        Raises:
+            UnknownObservation: an observation outside the state index.
+        """
+        batched = self.states.is_batch(observation)
+        rows = self.states.encode_batch(observation) if batched else np.array([self.states.encode(observation)])
+        p = self.probabilities[rows]
+        if deterministic:
+            actions = p.argmax(axis=1)
+        else:
+            draws = self._rng.random((rows.size, 1))  # pyright: ignore[reportAttributeAccessIssue]
+            actions = np.minimum((draws >= p.cumsum(axis=1)).sum(axis=1), p.shape[1] - 1)
+        return (actions if batched else np.int64(actions[0])), state

@@ -1,0 +1,113 @@
+"""Rewards, and files that hold them.
+
+A reward on states is paid on *arrival*: a step from s to s' pays R(s'), also when it ends the episode. Ng & Russell's
+V = R + gamma P V pays it at s; with W = P (R + gamma W), what an agent collects, V = R + gamma W, so the same policies are
+greedy for both, and a terminal goal is paid exactly once. A reward on steps (S, A) pays R(s, a).
+"""
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from irl_gym._typing import Matrix
+from irl_gym.errors import InvalidReward
+from irl_gym.mdp import TransitionTable
+
+FORMAT = "irl_gym.TabularReward/1"
+
+
+@runtime_checkable
+class RewardFunction(Protocol):
+    """What a step pays, in rows of a state index."""
+
+    def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
+        """The reward of steps (s, a, s'): scalars or arrays (N,) in, the same shape out."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TabularReward:
+    """A reward in a table: (S,) paid on arrival, or (S, A) paid for the step. Immutable.
+
+    Raises:
+        InvalidReward: neither one nor two axes, or a value that is not finite.
+    """
+
+    values: np.ndarray
+    """(S,) or (S, A) float64."""
+    note: Mapping[str, Any] = field(default_factory=dict)
+    """Where it comes from; anything json can hold."""
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, dtype=np.float64)
+        if values.ndim not in (1, 2) or values.size == 0:
+            raise InvalidReward(f"the reward has shape {values.shape}: expected (S,) or (S, A).")
+        wrong = np.argwhere(~np.isfinite(values))
+        if wrong.size:
+            where = tuple(int(i) for i in wrong[0])
+            raise InvalidReward(f"R{list(where)} is {values[where]}: a reward is a finite number.")
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self.values, dict(self.note))
+
+    @property
+    def n_states(self) -> int:
+        """Number of states S."""
+        return self.values.shape[0]
+
+    @property
+    def on_states(self) -> bool:
+        """Is this a reward on states, paid on arrival?"""
+        return self.values.ndim == 1
+
+    def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
+        """The reward of steps (s, a, s'): scalars or arrays (N,) in, the same shape out."""
+        return self.values[next_states] if self.on_states else self.values[states, actions]
+
+    def expected(self, table: TransitionTable) -> Matrix:
+        """(S, A) the expected reward of a step; 0 in terminal states, which take none.
+
+        Raises:
+            InvalidReward: a reward for another number of states or actions.
+        """
+        shape = (table.n_states, table.n_actions)
+        if self.values.shape != shape[: self.values.ndim]:
+            raise InvalidReward(
+                f"the reward has shape {self.values.shape}: expected ({shape[0]},) or {shape}. Is it another table's?"
+            )
+        if self.on_states:
+            return (table.P @ self.values).reshape(shape)
+        return np.where(table.terminal[:, None], 0.0, self.values)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
+        path = Path(path)
+        beside = path.with_name(f".{path.name}.tmp.npz")
+        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True)
+        np.savez(beside, values=self.values, header=np.array(header))
+        beside.replace(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> "TabularReward":
+        """Read what `save` wrote. Nothing is unpickled.
+
+        Raises:
+            FileNotFoundError: no such file.
+            InvalidReward: the file holds no reward.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                header, values = json.loads(str(archive["header"])), archive["values"]
+        except (ValueError, KeyError, zipfile.BadZipFile, EOFError, TypeError) as error:
+            raise InvalidReward(f"{path} holds no reward ({error}): expected a file written by TabularReward.save.") from error
+        if not isinstance(header, dict) or header.get("format") != FORMAT:
+            raise InvalidReward(f"{path} has format {header!r}: expected {FORMAT!r}. Was it written by a newer version?")
+        return cls(values, header.get("note", {}))

@@ -1,0 +1,84 @@
+"""Oracles that share no code with irl_gym: the LP of Ng & Russell as printed, and value iteration on dense arrays.
+
+Axes: S states, A actions; P is (S, A, S) and the rows of terminal states are zero.
+"""
+
+import numpy as np
+from scipy.optimize import linprog
+
+
+def paper_lp(P: np.ndarray, gamma: float, expert: np.ndarray, *, l1: float = 0.0, r_max: float = 1.0):
+    """Section 3.2, with the explicit inverse. Unknowns: t (S), R+ (S), R- (S). Returns the objective and R.
+
+    maximise    sum_s t(s) - l1 sum(R+ + R-)
+    subject to  t(s) <= (P_pi(s) - P_a(s)) (I - gamma P_pi)^-1 R,    0 <= the same,    for all a != pi(s)
+                R = R+ - R-,    0 <= R+, R- <= r_max,    |R| <= r_max
+    """
+    S, A, _ = P.shape
+    P_pi = P[np.arange(S), expert]
+    inverse = np.linalg.inv(np.eye(S) - gamma * P_pi)
+    upper = []
+    for s in range(S):
+        for a in range(A):
+            if a == expert[s]:
+                continue
+            margin = (P_pi[s] - P[s, a]) @ inverse
+            picks_t = np.eye(S)[s]
+            upper.append(np.concatenate([picks_t, -margin, margin]))  # t(s) - margin R <= 0
+            upper.append(np.concatenate([np.zeros(S), -margin, margin]))  # (4): -margin R <= 0
+    for sign in (1, -1):
+        upper.extend(np.hstack([np.zeros((S, S)), sign * np.eye(S), -sign * np.eye(S)]))  # |R| <= r_max
+    right = np.concatenate([np.zeros(len(upper) - 2 * S), np.full(2 * S, r_max)])
+    cost = np.concatenate([-np.ones(S), np.full(2 * S, l1)])
+    bounds = [(None, None)] * S + [(0, r_max)] * (2 * S)
+    found = linprog(cost, A_ub=np.array(upper), b_ub=right, bounds=bounds, method="highs")
+    assert found.success, found.message
+    return -found.fun, found.x[S : 2 * S] - found.x[2 * S :]
+
+
+def critical_l1_by_bisection(P: np.ndarray, gamma: float, expert: np.ndarray, *, steps: int = 40) -> float:
+    """The paper's own way to lambda_0: the largest l1 at which the LP's optimum is above 0."""
+    low, high = 0.0, 1.0
+    while paper_lp(P, gamma, expert, l1=high)[0] > 1e-9:
+        low, high = high, 2 * high
+    for _ in range(steps):
+        middle = (low + high) / 2
+        if paper_lp(P, gamma, expert, l1=middle)[0] > 1e-9:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def values(P: np.ndarray, gamma: float, R: np.ndarray) -> np.ndarray:
+    """V* (S,) of a step reward R (S, A), by sweeps until nothing is left of the first guess."""
+    V = np.zeros(len(P))
+    for _ in range(int(np.ceil(np.log(1e-13) / np.log(gamma)))):
+        V = action_values(P, gamma, R, V).max(axis=1)
+    return V
+
+
+def action_values(P: np.ndarray, gamma: float, R: np.ndarray, V: np.ndarray) -> np.ndarray:
+    """Q = R + gamma P V (S, A); nothing is paid in terminal states."""
+    return np.where(P.sum(axis=2) == 0, 0.0, R) + gamma * P @ V
+
+
+def optimal_actions(P: np.ndarray, gamma: float, R: np.ndarray) -> np.ndarray:
+    """(S,) the first optimal action of each state, ties to 1e-9."""
+    Q = action_values(P, gamma, R, values(P, gamma, R))
+    return (Q >= Q.max(axis=1, keepdims=True) - 1e-9).argmax(axis=1)
+
+
+def margins(P: np.ndarray, gamma: float, expert: np.ndarray, R: np.ndarray, *, skip_equal: bool = False) -> np.ndarray:
+    """(S,) min over a != pi(s) of (P_pi(s) - P_a(s)) V with V = (I - gamma P_pi)^-1 R.
+
+    With `skip_equal` actions with the expert's successors are left out; infinite where nothing is left.
+    """
+    S = len(P)
+    P_pi = P[np.arange(S), expert]
+    V = np.linalg.inv(np.eye(S) - gamma * P_pi) @ R
+    differences = (P_pi[:, None, :] - P) @ V
+    differences[np.arange(S), expert] = np.inf
+    if skip_equal:
+        differences[np.abs(P_pi[:, None, :] - P).max(axis=2) < 1e-12] = np.inf
+    return differences.min(axis=1)

@@ -1,0 +1,66 @@
+"""The rows of equation (4): the expert's action against each other action (Ng & Russell 2000, section 3.1).
+
+    (4)  (P_pi(s) - P_a(s)) V >= 0    for each state s and each action a that the expert does not take
+Actions that the expert *does* take, when there are several, have to be equally good: their rows are equalities, or pi
+would not be optimal. A row whose action has the same successors as the expert's is 0 >= 0: *trivial*, whatever the reward.
+Terminal states have no rows. Axes: S states, A actions, n rows.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from irl_gym._typing import ActionSets, Matrix, Sparse
+from irl_gym.mdp import TransitionTable
+from irl_gym.policies import as_distribution
+
+ROUNDING = 1e-14
+SAME_SUCCESSORS = 1e-12  # largest difference between two rows of P that are the same but for rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Comparisons:
+    """The expert's successors minus another action's, one row for each state and action compared."""
+
+    rows: Sparse
+    """(n, S) P_pi(s) - P_a(s)."""
+    states: np.ndarray
+    """(n,) state of each row, increasing."""
+    actions: np.ndarray
+    """(n,) action of each row."""
+    equal: np.ndarray
+    """(n,) the expert takes this action too: the row is an equality."""
+    distribution: Matrix
+    """(S, A) the expert."""
+
+    @cached_property
+    def trivial(self) -> np.ndarray:
+        """(n,) the two actions have the same successors: no reward on states can tell them apart."""
+        difference = abs(self.rows)
+        return np.asarray(difference.max(axis=1).todense()).ravel() <= SAME_SUCCESSORS
+
+    @property
+    def expert_set(self) -> ActionSets:
+        """(S, A) the actions that the expert takes."""
+        return self.distribution > 0
+
+
+def compare(table: TransitionTable, expert: Any) -> Comparisons:
+    """The rows of (4) for an expert given as (S,) actions, (S, A) probabilities or an (S, A) set of optimal actions.
+
+    Raises:
+        InvalidPolicy: wrong shape or content.
+    """
+    distribution = as_distribution(expert, table.n_states, table.n_actions)
+    taken = distribution > 0
+    several = taken.sum(axis=1) > 1
+    wanted = ~table.terminal[:, None] & (~taken | several[:, None])
+    states, actions = np.nonzero(wanted)
+    P_pi = table.P_pi(distribution)
+    rows = sp.csr_array(P_pi[states] - table.P[states * table.n_actions + actions])
+    rows.data[np.abs(rows.data) <= ROUNDING] = 0.0  # what both actions share cancels, but for rounding
+    rows.eliminate_zeros()
+    return Comparisons(rows, states, actions, taken[states, actions], distribution)

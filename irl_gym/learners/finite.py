@@ -1,0 +1,228 @@
+"""Linear-programming IRL for finite state spaces (Ng & Russell 2000, section 3; lecture notes 2.2.3).
+
+Given P, gamma and the expert's policy pi, find R under which pi is optimal, and as far from ties as possible:
+    maximise    sum_s min_{a != pi(s)} (P_pi(s) - P_a(s)) V - l1 ||R||_1
+    subject to  (4): (P_pi - P_a) V >= 0 for each a;   V = (I - gamma P_pi)^-1 R (5);   |R(s)| <= R_max
+
+Two modes:
+`margin_cap=None`  the paper's LP. It trades margins between states: some get none, and in these the expert is tied with
+    actions that can be disastrous under the true reward.
+`margin_cap=tau`   Departs: each margin counts up to tau only, and rows that compare identical successors are left out (they
+    would force the margin of their state to 0). No state's margin is bought at another's expense.
+`margin_cap="auto"`  tau = half of eps*, the largest margin that every state can have at once. A cap of at most eps* is attained
+    in every state that can have a margin at all, so no tie is left that a reward could break; and half of it leaves an interior
+    of rewards that attain it, in which the l1 term finds the simplest. With l1 = 0 the reward is the limit l1 -> 0+ of the
+    capped LP: the least ||R||_1 with all margins at least tau, the optimum for every l1 below `stats["l1_limit"]`.
+Axes: S states, A actions.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from irl_gym.certificate import certify, least_per_state, row_margins
+from irl_gym.comparisons import Comparisons, compare
+from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverError, SolverFailed
+from irl_gym.learners import programs
+from irl_gym.learners.base import IRLResult
+from irl_gym.learners.programs import Program, RewardOn, Solved, Solving
+from irl_gym.mdp import TabularMDP
+from irl_gym.rewards import TabularReward
+from irl_gym.solvers import SolverName, Status
+
+JUST_BELOW = 1 - 1e-3
+"""`l1="auto"` is lambda_0 times this."""
+NO_MARGIN = 1e-9
+"""A margin below this, relative to R_max, is none: it is the solvers' rounding."""
+LARGEST_BOUND = 1e6
+"""Uniform margins below R_max over this are looked for among fewer states."""
+
+
+@dataclass(frozen=True)
+class FiniteLP:
+    """Linear-programming IRL for finite state spaces (Ng & Russell 2000, section 3.2).
+
+    Raises:
+        InvalidParameter: a field outside its range.
+    """
+
+    r_max: float = 1.0
+    """R_max > 0, the bound on |R|. Paper, section 3.2."""
+    l1: float | Literal["auto"] = 0.0
+    """lambda >= 0, the price of ||R||_1; "auto" is just below lambda_0, the price at which R becomes 0."""
+    margin_cap: float | Literal["auto"] | None = "auto"
+    """tau > 0, the cap on margins; "auto" chooses it; None is the paper's LP."""
+    reward_on: RewardOn = "state"
+    """"state" for R(s) as in the paper; "state-action" for R(s, a), when no R(s) singles the expert out."""
+    report_lambda_0: bool = False
+    """Compute lambda_0 for the certificate even when l1 is 0: one more LP."""
+    solver: SolverName = "auto"
+    """"auto" chooses by size; see `irl_gym.solvers`."""
+    time_limit: float | None = None
+    """Seconds for each program; None for no limit."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.r_max < np.inf:
+            raise InvalidParameter(f"r_max is {self.r_max}: expected a bound above 0, such as 1.0.")
+        if (isinstance(self.l1, str) and self.l1 != "auto") or (not isinstance(self.l1, str) and not 0 <= self.l1 < np.inf):
+            raise InvalidParameter(f"l1 is {self.l1!r}: expected a number of at least 0, or 'auto'.")
+        cap = self.margin_cap
+        if (isinstance(cap, str) and cap != "auto") or (isinstance(cap, int | float) and not 0 < cap < np.inf):
+            raise InvalidParameter(f"margin_cap is {cap!r}: expected a number above 0, 'auto' or None.")
+        if self.reward_on not in ("state", "state-action"):
+            raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
+
+    def fit(self, mdp: TabularMDP, expert: Any) -> IRLResult:
+        """Learn a reward under which the expert is optimal.
+
+        Args:
+            mdp: only states reachable from d0 get a reward; the others get 0 and are not judged.
+            expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions.
+
+        Raises:
+            InvalidPolicy: an expert of the wrong shape or content.
+            DegenerateExpert: (4) leaves no reward with a positive margin anywhere.
+            SolverTimeout, SolverFailed: no answer.
+        """
+        task = _Task(self, mdp, expert)
+        lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
+        l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
+        if self.margin_cap is None:
+            solved, cap = programs.ng_russell(task.program(), self.r_max, l1, None), None
+            y = solved.y
+        else:
+            cap = task.cap() if self.margin_cap == "auto" else float(self.margin_cap)
+            if self.margin_cap == "auto" and l1 == 0:
+                solved = programs.sparsest(task.program(), self.r_max, cap)
+                price = float(np.bincount(task.comparisons.states, np.maximum(solved.y, 0)).max())
+                task.stats["l1_limit"] = 1 / max(price, 1e-300)
+                y = np.zeros_like(solved.y)
+            else:
+                solved, y = (result := programs.ng_russell(task.program(), self.r_max, l1, cap)), result.y
+        task.record("reward", solved)
+        result = task.result(solved, y, l1, lambda_0, cap)
+        if l1 == 0 and result.objective <= NO_MARGIN * min(self.r_max, cap or np.inf):
+            raise task.degenerate()
+        return result
+
+    def critical_l1(self, mdp: TabularMDP, expert: Any) -> float:
+        """lambda_0: above it R = 0 is optimal (section 3.2). By one linear program, not by the paper's search.
+
+        Raises:
+            InvalidPolicy: an expert of the wrong shape or content.
+            DegenerateExpert: no reward has a positive margin, so lambda_0 would be 0.
+        """
+        return _Task(self, mdp, expert).lambda_0()
+
+
+class _Task:
+    """One fit: the reachable part of the MDP, the rows of (4), and the states that count."""
+
+    def __init__(self, learner: FiniteLP, mdp: TabularMDP, expert: Any):
+        self.learner, self.mdp, self.expert = learner, mdp, expert
+        mdp.mixing(expert)  # checks all states, reachable or not
+        self.rows = np.flatnonzero(mdp.reachable)
+        self.part = mdp.restrict(self.rows)
+        self.comparisons: Comparisons = compare(self.part, np.asarray(expert)[self.rows])
+        self.stats: dict[str, Any] = {"programs": {}}
+        self.counted = self._candidates()
+        if not self.counted.any():
+            raise self._nothing_to_compare()
+
+    def _candidates(self) -> np.ndarray:
+        """(n,) rows that can have a margin: in the paper's LP a trivial row takes it from all rows of its state."""
+        c = self.comparisons
+        if self.learner.reward_on == "state-action":
+            return ~c.equal
+        usable = ~c.equal & ~c.trivial
+        if self.learner.margin_cap is None:
+            usable &= ~np.isin(c.states, c.states[c.trivial & ~c.equal])
+        return usable
+
+    def program(self) -> Program:
+        learner = self.learner
+        solving = Solving(learner.solver, learner.time_limit)
+        return Program(self.part, self.comparisons, learner.reward_on, self.counted, solving)
+
+    def record(self, name: str, solved: Solved) -> None:
+        answer = solved.answer
+        self.stats["programs"][name] = {
+            "solver": answer.solver,
+            "seconds": answer.seconds,
+            "iterations": answer.iterations,
+            "attempts": answer.attempts,
+        }
+
+    def lambda_0(self) -> float:
+        solved = programs.critical_l1(self.program())
+        self.record("lambda_0", solved)
+        if solved.answer.objective <= NO_MARGIN:
+            raise self.degenerate()
+        return solved.answer.objective
+
+    def cap(self) -> float:
+        """Half of the largest uniform margin; leaves in `counted` the rows of the states that can have one."""
+        bound = self._uniform_bound()
+        if bound is None:
+            served = programs.attainable(self.program())
+            self.record("attainable", served)
+            states = self._served(served)
+            self.counted = self.counted & np.isin(self.comparisons.states, states)
+            if not self.counted.any():
+                raise self.degenerate()
+            bound = self._uniform_bound()
+            if bound is None:
+                raise SolverError("the states that can have a margin were found, but no uniform margin: report this table.")
+        self.stats["uniform_margin"] = self.learner.r_max / bound
+        return self.learner.r_max / bound / 2
+
+    def _uniform_bound(self) -> float | None:
+        """Least bound on |R| for margins of 1 in all counted states; None if there is none (the program is infeasible)."""
+        try:
+            solved = programs.uniform_margin(self.program())
+        except SolverFailed:
+            return None
+        self.record("uniform margin", solved)
+        return solved.answer.objective if 0 < solved.answer.objective < LARGEST_BOUND else None
+
+    def _served(self, solved: Solved) -> np.ndarray:
+        c = self.comparisons
+        margins = row_margins(self.part, c, TabularReward(solved.R))
+        least = least_per_state(margins[self.counted], c.states[self.counted], self.part.n_states)
+        return np.flatnonzero(least > 0.5)
+
+    def _nothing_to_compare(self) -> DegenerateExpert:
+        c, where = self.comparisons, f"the {self.rows.size} reachable states"
+        if c.equal.all():
+            return DegenerateExpert(f"the expert takes every action in each of {where}: expected one that it leaves out.")
+        if (c.equal | c.trivial).all():
+            return DegenerateExpert(
+                f"none of {where} compares the expert with an action of other successors: every reward on states makes it "
+                'optimal. Use reward_on="state-action".'
+            )
+        return DegenerateExpert(
+            f"each of {where} has an action with the expert's own successors, which takes its margin in the paper's LP. Use "
+            'margin_cap="auto", which leaves such rows out.'
+        )
+
+    def degenerate(self) -> DegenerateExpert:
+        where = "state reward" if self.learner.reward_on == "state" else "reward"
+        mend = ' Use reward_on="state-action".' if self.learner.reward_on == "state" else ""
+        return DegenerateExpert(
+            f"equation (4) holds for this expert only with every margin 0, as for R = constant: no {where} over the "
+            f"{self.rows.size} reachable states prefers its actions. Is the policy optimal for any reward at all?{mend}"
+        )
+
+    def result(self, solved: Solved, y: np.ndarray, l1: float, lambda_0: float | None, cap: float | None) -> IRLResult:
+        values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
+        if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
+            values[self.rows] = solved.R
+        reward = TabularReward(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
+        counted = self.rows[np.unique(self.comparisons.states[self.counted])]
+        certificate = certify(
+            self.mdp, self.expert, reward,
+            r_max=self.learner.r_max, l1=l1, lambda_0=lambda_0, margin_cap=cap, counted=counted, y=y,
+        )  # fmt: skip
+        status = Status.ZERO if certificate.zero else solved.answer.status
+        return IRLResult(reward, status, certificate.objective, certificate, self.stats)

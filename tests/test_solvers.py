@@ -1,0 +1,103 @@
+import cvxpy as cp
+import models
+import numpy as np
+import pytest
+
+from irl_gym import solvers
+from irl_gym.errors import InvalidParameter, SolverFailed, SolverTimeout
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.solvers import Status, solve
+
+both = pytest.mark.parametrize("solver", ["clarabel", "highs"])
+
+
+def diet():
+    """Minimise x + y subject to 2x + y >= 4 and x + 3y >= 6, x, y >= 0: 2.8 at (1.2, 1.6)."""
+    x = cp.Variable(2, nonneg=True)
+    return cp.Problem(cp.Minimize(cp.sum(x)), [2 * x[0] + x[1] >= 4, x[0] + 3 * x[1] >= 6])
+
+
+def infeasible():
+    x = cp.Variable()
+    return cp.Problem(cp.Minimize(x), [x >= 1, x <= 0])
+
+
+def unbounded():
+    x = cp.Variable()
+    return cp.Problem(cp.Minimize(x), [x <= 0])
+
+
+@both
+def test_solve_finds_the_optimum(solver):
+    answer = solve(diet(), rows=2, solver=solver)
+    assert (answer.solver, answer.status, answer.attempts) == (solver, Status.OPTIMAL, 1)
+    assert answer.objective == pytest.approx(2.8, abs=1e-7)
+
+
+@both
+def test_solve_leaves_values_in_the_variables(solver):
+    problem = diet()
+    solve(problem, rows=2, solver=solver)
+    np.testing.assert_allclose(problem.variables()[0].value, [1.2, 1.6], atol=1e-6)
+
+
+@pytest.mark.parametrize(("rows", "chosen"), [(solvers.SMALL, "highs"), (solvers.SMALL + 1, "clarabel")])
+def test_solve_chooses_by_size(rows, chosen):
+    assert solve(diet(), rows=rows).solver == chosen
+
+
+def test_solve_answers_with_a_vertex_when_small():
+    x = cp.Variable(2, nonneg=True)
+    problem = cp.Problem(cp.Minimize(cp.sum(x)), [cp.sum(x) >= 1])
+    solve(problem, rows=1)
+    assert sorted(x.value.tolist()) == [0, 1]
+
+
+@both
+def test_solve_tries_the_other_solver_when_the_first_gives_up(solver, monkeypatch):
+    hobbled = {"clarabel": {"max_iter": 1}, "highs": {"simplex_iteration_limit": 0, "presolve": "off"}}[solver]
+    for name, value in hobbled.items():
+        monkeypatch.setitem(solvers._SOLVERS[solver].options, name, value)
+    answer = solve(diet(), rows=2, solver=solver)
+    assert (answer.solver != solver, answer.attempts) == (True, 2)
+
+
+@both
+@pytest.mark.parametrize(("problem", "word"), [(infeasible, "infeasible"), (unbounded, "unbounded")])
+def test_solve_says_what_is_wrong_with_a_program_without_an_answer(solver, problem, word):
+    with pytest.raises(SolverFailed, match=f"{solver}: {word}"):
+        solve(problem(), rows=2, solver=solver)
+
+
+@both
+def test_solve_stops_when_its_time_is_up(solver):
+    model = models.random_model(0, S=400, A=4, kind="sparse", gamma=0.99)
+    hurried = FiniteLP(margin_cap=None, solver=solver, time_limit=1e-3)
+    with pytest.raises(SolverTimeout, match=rf"no answer in 0\.001 s.*{solver}: time limit of 0\.001 s.*raise time_limit"):
+        hurried.fit(model.mdp, model.expert)
+
+
+def test_solve_does_not_call_an_infeasible_program_slow():
+    with pytest.raises(SolverFailed, match="infeasible"):
+        solve(infeasible(), rows=2, time_limit=60.0)
+
+
+@both
+def test_solve_answers_within_a_generous_time_limit(solver):
+    assert solve(diet(), rows=2, solver=solver, time_limit=60.0).objective == pytest.approx(2.8)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_solve_refuses_a_time_limit_that_is_not_positive(limit):
+    with pytest.raises(InvalidParameter, match=f"time_limit is {limit}"):
+        solve(diet(), rows=2, time_limit=limit)
+
+
+def test_solve_refuses_an_unknown_solver(unchecked):
+    with pytest.raises(InvalidParameter, match="solver is 'simplex'"):
+        solve(diet(), rows=2, solver="simplex")
+
+
+@pytest.mark.parametrize("status", Status)
+def test_status_is_a_sentence(status):
+    assert status.value[0].isupper() and " " in status.value

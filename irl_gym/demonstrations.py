@@ -1,0 +1,249 @@
+"""Demonstrations: episodes of a policy, and what they say about it.
+
+An episode of T steps has T + 1 observations, T actions, T rewards, and ends by `terminated` or `truncated`.
+Axes: S states, A actions, K features, T steps, N episodes.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym._typing import Matrix, StateMask
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.mdp import TransitionTable
+from irl_gym.policies import Policy, as_distribution
+from irl_gym.sampling import Successors
+from irl_gym.states import StateIndex
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """One episode.
+
+    Raises:
+        InvalidDemonstrations: lengths that do not fit together, or no step at all.
+    """
+
+    observations: Any
+    """T + 1 observations, stacked as vector environments stack them."""
+    actions: np.ndarray
+    """(T,) integers from 0, whatever number the action space starts at."""
+    rewards: np.ndarray
+    """(T,) what the environment paid."""
+    terminated: bool
+    """Did the last step end the episode?"""
+    truncated: bool
+    """Did a time limit?"""
+    seed: int | None = None
+    """Given to `reset`; None when the episode was drawn from a table."""
+
+    def __post_init__(self) -> None:
+        steps = len(self.actions)
+        if steps == 0 or len(self.rewards) != steps:
+            raise InvalidDemonstrations(
+                f"an episode has {steps} actions and {len(self.rewards)} rewards: expected as many rewards as actions, and "
+                "at least one."
+            )
+        count = _count(self.observations)
+        if count != steps + 1:
+            raise InvalidDemonstrations(
+                f"an episode of {steps} actions has {count} observations: expected {steps + 1}, the last one included."
+            )
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+    @property
+    def total_reward(self) -> float:
+        """Undiscounted return."""
+        return float(np.sum(self.rewards))
+
+    def rows(self, states: StateIndex) -> np.ndarray:
+        """(T+1,) the states visited.
+
+        Raises:
+            UnknownObservation: an observation that the index does not hold.
+        """
+        ended = np.zeros(len(self) + 1, dtype=bool)
+        ended[-1] = self.terminated
+        return states.encode_batch(self.observations, terminated=ended)
+
+
+def _count(observations: Any) -> int:
+    while isinstance(observations, dict | tuple):
+        observations = next(iter(observations.values())) if isinstance(observations, dict) else observations[0]
+    return len(observations)
+
+
+def _stack(observations: Sequence[Any]) -> Any:
+    first = observations[0]
+    if isinstance(first, dict):
+        return {key: _stack([one[key] for one in observations]) for key in first}
+    if isinstance(first, tuple):
+        return tuple(_stack([one[i] for one in observations]) for i in range(len(first)))
+    return np.asarray(observations)
+
+
+def collect(
+    env: gym.Env,
+    policy: Policy,
+    n_episodes: int,
+    *,
+    seed: int = 0,
+    deterministic: bool = False,
+    max_episode_steps: int | None = None,
+) -> Iterator[Episode]:
+    """Run a policy in an environment, an episode at a time; episode i is reset with seed + i.
+
+    Args:
+        env: any Gymnasium environment with integer actions.
+        policy: with SB3's `predict`; actions count from 0.
+        n_episodes: how many; at least 1.
+        seed: of the first episode.
+        deterministic: passed to `predict`.
+        max_episode_steps: truncate longer episodes; needed where the environment has no time limit and the policy may never
+            end one.
+
+    Raises:
+        InvalidParameter: fewer than 1 episodes or steps.
+    """
+    _check_count(n_episodes, max_episode_steps)
+    first_action = int(getattr(env.action_space, "start", 0))
+    for episode_seed in range(seed, seed + n_episodes):
+        observation, _ = env.reset(seed=episode_seed)
+        observations, actions, rewards = [observation], [], []
+        terminated = truncated = False
+        while not (terminated or truncated):
+            action, _ = policy.predict(observation, deterministic=deterministic)
+            observation, reward, terminated, truncated, _ = env.step(int(action) + first_action)
+            observations.append(observation)
+            actions.append(int(action))
+            rewards.append(float(reward))
+            truncated = truncated or (not terminated and len(actions) == max_episode_steps)
+        yield Episode(
+            _stack(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), episode_seed
+        )
+
+
+def _check_count(n_episodes: int, max_episode_steps: int | None) -> None:
+    for name, value in (("n_episodes", n_episodes), ("max_episode_steps", max_episode_steps)):
+        if value is not None and value < 1:
+            raise InvalidParameter(f"{name} is {value}: expected at least 1.")
+
+
+def collect_from_table(
+    table: TransitionTable,
+    entry_rewards: np.ndarray,
+    states: StateIndex,
+    policy: Any,
+    n_episodes: int,
+    *,
+    seed: int = 0,
+    max_episode_steps: int,
+) -> Iterator[Episode]:
+    """Draw episodes from a table, all at once: the same distribution as `collect`, many times faster.
+
+    Args:
+        table: P and d0.
+        entry_rewards: (nnz,) reward of each transition, in the order of `table.P.data`; see `Tabulation.entry_rewards`.
+        states: turns rows into the environment's observations.
+        policy: (S,) actions, (S, A) probabilities or (S, A) set.
+        n_episodes: N, at least 1.
+        seed: of the generator.
+        max_episode_steps: truncate longer episodes.
+
+    Raises:
+        InvalidParameter: fewer than 1 episodes or steps.
+        InvalidPolicy: wrong shape or content.
+    """
+    _check_count(n_episodes, max_episode_steps)
+    rng = np.random.default_rng(seed)
+    cumulated = as_distribution(policy, table.n_states, table.n_actions).cumsum(axis=1)
+    successors = Successors(table)
+    rows = np.full((n_episodes, max_episode_steps + 1), -1, dtype=np.int64)
+    actions = np.zeros((n_episodes, max_episode_steps), dtype=np.int64)
+    rewards = np.zeros((n_episodes, max_episode_steps))
+    length = np.zeros(n_episodes, dtype=np.int64)
+    rows[:, 0] = successors.start(n_episodes, rng)
+    going = np.arange(n_episodes)
+    for t in range(max_episode_steps):
+        if not going.size:
+            break
+        here = rows[going, t]
+        draws = rng.random((going.size, 1))
+        actions[going, t] = np.minimum((draws >= cumulated[here]).sum(axis=1), table.n_actions - 1)
+        entries = successors.entries(here, actions[going, t], rng)
+        rows[going, t + 1] = table.P.indices[entries]
+        rewards[going, t] = entry_rewards[entries]
+        length[going] = t + 1
+        going = going[~table.terminal[rows[going, t + 1]]]
+    for i, n in enumerate(length.tolist()):
+        ended = bool(table.terminal[rows[i, n]])
+        yield Episode(states.decode_batch(rows[i, : n + 1]), actions[i, :n], rewards[i, :n], ended, not ended)
+
+
+@dataclass(frozen=True, eq=False)
+class EmpiricalPolicy:
+    """What episodes say about the policy that made them, and where they say nothing."""
+
+    counts: np.ndarray
+    """(S, A) int64, how often each action was taken in each state."""
+
+    @property
+    def visited(self) -> StateMask:
+        """(S,) states in which at least one action was seen."""
+        return self.counts.sum(axis=1) > 0
+
+    @property
+    def probabilities(self) -> Matrix:
+        """(S, A) maximum-likelihood probabilities; NaN in states never visited, about which the data say nothing."""
+        total = self.counts.sum(axis=1, keepdims=True)
+        return np.divide(self.counts, total, out=np.full(self.counts.shape, np.nan), where=total > 0)
+
+
+def empirical_policy(episodes: Iterable[Episode], states: StateIndex, n_actions: int) -> EmpiricalPolicy:
+    """Count the actions taken in each state.
+
+    Raises:
+        InvalidDemonstrations: an action out of range, naming episode and step; or no episode.
+        UnknownObservation: an observation that the index does not hold.
+    """
+    counts = np.zeros((states.n_states, n_actions), dtype=np.int64)
+    number = -1
+    for number, episode in enumerate(episodes):
+        wrong = np.flatnonzero((episode.actions < 0) | (episode.actions >= n_actions))
+        if wrong.size:
+            raise InvalidDemonstrations(
+                f"episode {number}, step {wrong[0]} takes action {episode.actions[wrong[0]]}: expected 0 to {n_actions - 1}."
+            )
+        np.add.at(counts, (episode.rows(states)[:-1], episode.actions), 1)
+    if number < 0:
+        raise InvalidDemonstrations("there are no episodes: expected at least one.")
+    return EmpiricalPolicy(counts)
+
+
+def feature_expectations(episodes: Iterable[Episode], features: np.ndarray, states: StateIndex, gamma: float) -> np.ndarray:
+    """(K,) mean over episodes of sum_t gamma^t phi(s_t), starting with phi(s_0): equation (11) of Ng & Russell.
+
+    Args:
+        episodes: at least one.
+        features: (S, K) phi.
+        states: turns observations into rows of phi.
+        gamma: discount.
+
+    Raises:
+        InvalidDemonstrations: no episode.
+        InvalidParameter: features of the wrong shape.
+    """
+    if features.ndim != 2 or features.shape[0] != states.n_states:
+        raise InvalidParameter(f"the features have shape {features.shape}: expected ({states.n_states}, K).")
+    total, number = np.zeros(features.shape[1]), 0
+    for number, episode in enumerate(episodes, start=1):  # noqa: B007 (its last value is the count)
+        rows = episode.rows(states)
+        total += gamma ** np.arange(rows.size) @ features[rows]
+    if not number:
+        raise InvalidDemonstrations("there are no episodes: expected at least one.")
+    return total / number

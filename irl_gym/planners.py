@@ -1,0 +1,217 @@
+"""Planners: environments to policies. Experts and retrained agents alike.
+
+`ValueIteration` plans on the table; `SB3` learns from steps with Stable-Baselines3. Both are frozen records, both give a
+policy with SB3's `predict`.
+"""
+
+import contextlib
+import copy
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+import gymnasium as gym
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3 import A2C, DQN, PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv
+
+from irl_gym._typing import Actions
+from irl_gym.dynamic_programming import value_iteration
+from irl_gym.errors import InvalidParameter
+from irl_gym.mdp import TabularMDP
+from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.states import StateIndex
+from irl_gym.tabular_vec_env import TabularVecEnv
+from irl_gym.tabulate import tabulate
+
+Algorithm = Literal["PPO", "DQN", "A2C"]
+Progress = Callable[[int, Policy], None]
+"""Called with the environment steps made so far and the policy as it is."""
+
+_ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"PPO": PPO, "DQN": DQN, "A2C": A2C}
+
+# One-hot input and no hidden layer: logits and values are tables, one entry a state, and Adam's large steps are safe. Measured
+# on the eight environments of the README; with SB3's own defaults (two layers of 64, 3e-4) the same takes 5 to 20 times longer.
+_LINEAR: dict[str, Any] = {"net_arch": []}
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "PPO": {
+        "n_epochs": 4, "learning_rate": 0.03, "gae_lambda": 0.6, "ent_coef": 0.03,
+        "policy_kwargs": _LINEAR,
+    },
+    "A2C": {"n_steps": 8, "learning_rate": 0.03, "gae_lambda": 0.9, "ent_coef": 0.01, "policy_kwargs": _LINEAR},
+    "DQN": {
+        "learning_rate": 0.01, "learning_starts": 1_000, "batch_size": 512, "train_freq": 4, "gradient_steps": 4,
+        "target_update_interval": 500, "exploration_fraction": 0.5, "buffer_size": 100_000, "policy_kwargs": _LINEAR,
+    },
+}  # fmt: skip
+"""Hyper-parameters for discrete observations; other observation spaces get SB3's own."""
+
+FOR_ADVANTAGES: dict[str, Any] = {"normalize_advantage": False, "ent_coef": 0.1}
+"""PPO on a reward between -1 and 0, as `ExpectedAdvantage(clip)` gives: its scale is known, and normalising each batch would
+let the frequent states drown what is left to learn in rare ones. FrozenLake 8x8: score 0.99 instead of 0.98."""
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """Turns an environment into a policy for it."""
+
+    def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Policy:
+        """Find a good policy for the reward that `env` pays."""
+        ...
+
+
+@dataclass(frozen=True)
+class ValueIteration:
+    """Exact planning on the table of the environment."""
+
+    tolerance: float = 1e-8
+    """Bound on the error of the values, in units of value."""
+    sweeps: int = 50
+    """Evaluation sweeps after each improvement; 0 for plain value iteration."""
+    preference: Sequence[int] | None = None
+    """Order in which ties between actions are broken; the default is 0, 1, ..."""
+
+    def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> TabularPolicy:
+        """The optimal policy of the environment's table.
+
+        Raises:
+            NotTabular, NotDiscrete: no table can be made.
+        """
+        if isinstance(env, TabularVecEnv):
+            table, R = env.table, env.reward.expected(env.table)
+            states = env.states or StateIndex(spaces.Discrete(table.n_states))
+            mdp = TabularMDP(table.P, gamma, table.d0)
+        elif isinstance(env, VecEnv):
+            raise InvalidParameter(f"{type(env).__name__} has no table: expected a Gymnasium environment or TabularVecEnv.")
+        else:
+            found = tabulate(env, gamma=gamma, check_steps=0)
+            mdp, R, states = found.mdp, found.reward.values, found.states
+        solution = value_iteration(mdp, R, tolerance=self.tolerance, sweeps=self.sweeps, preference=self.preference)
+        return TabularPolicy(as_distribution(solution.policy, mdp.n_states, mdp.n_actions), states, seed)
+
+
+@dataclass(frozen=True, eq=False)
+class Agent:
+    """A trained Stable-Baselines3 model, as a policy."""
+
+    model: BaseAlgorithm
+    """The model; everything SB3 offers is there."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """SB3's `predict`."""
+        return self.model.predict(observation, state, episode_start, deterministic)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write SB3's zip. Beside first, then renamed."""
+        path = Path(path)
+        beside = path.with_name(f".{path.name}.tmp.zip")
+        self.model.save(beside)
+        beside.replace(path)
+
+
+def load_agent(path: str | os.PathLike, algorithm: Algorithm) -> Agent:
+    """Load an agent from SB3's zip. Such a file can run code when loaded: load only files you trust.
+
+    Raises:
+        FileNotFoundError: no such file.
+        InvalidParameter: an unknown algorithm.
+    """
+    return Agent(_algorithm(algorithm).load(Path(path), device="cpu"))
+
+
+def _algorithm(name: str) -> type[BaseAlgorithm]:
+    if name not in _ALGORITHMS:
+        raise InvalidParameter(f"algorithm is {name!r}: expected one of {sorted(_ALGORITHMS)}.")
+    return _ALGORITHMS[name]
+
+
+@dataclass(frozen=True)
+class SB3:
+    """Reinforcement learning with Stable-Baselines3.
+
+    Raises:
+        InvalidParameter: an unknown algorithm, or fewer than 1 steps.
+    """
+
+    algorithm: Algorithm = "PPO"
+    """"PPO", "DQN" or "A2C"."""
+    total_timesteps: int = 400_000
+    """Environment steps, all copies together."""
+    hyperparameters: Mapping[str, Any] = field(default_factory=dict)
+    """Of SB3's constructor; they override `DEFAULTS`."""
+    threads: int = 1
+    """Torch threads while training. Networks this small are slower on more."""
+
+    def __post_init__(self) -> None:
+        _algorithm(self.algorithm)
+        if self.total_timesteps < 1:
+            raise InvalidParameter(f"total_timesteps is {self.total_timesteps}: expected at least 1.")
+
+    def plan(
+        self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0
+    ) -> Agent:
+        """Train a new agent.
+
+        Args:
+            env: what to train on; a TabularVecEnv is by far the fastest.
+            gamma: discount.
+            seed: of the agent and, through it, of the environment.
+            progress: called about every `interval` environment steps, and at the end.
+            interval: environment steps between calls; 0 for a hundredth of the total.
+        """
+        settings = self._settings(env)
+        with _torch_threads(self.threads):
+            model = _algorithm(self.algorithm)("MlpPolicy", env, gamma=gamma, seed=seed, device="cpu", **settings)  # pyright: ignore
+            agent = Agent(model)
+            callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
+            model.learn(self.total_timesteps, callback=callback)
+        if progress:
+            progress(model.num_timesteps, agent)
+        return agent
+
+    def _settings(self, env: gym.Env | VecEnv) -> dict[str, Any]:
+        """What SB3's constructor is given; a copy, since SB3 writes into `policy_kwargs`."""
+        discrete = isinstance(env.observation_space, spaces.Discrete)
+        settings = copy.deepcopy({**(DEFAULTS[self.algorithm] if discrete else {}), **self.hyperparameters})
+        if discrete and self.algorithm == "PPO":  # rollouts of 2048 steps, whatever the number of copies
+            copies = getattr(env, "num_envs", 1)
+            settings.setdefault("n_steps", max(8, 2048 // copies))
+            settings.setdefault("batch_size", math.gcd(settings["n_steps"] * copies, 1024))
+        return settings
+
+
+class _Report(BaseCallback):
+    def __init__(self, agent: Agent, progress: Progress, interval: int):
+        super().__init__()
+        self._agent, self._progress, self._interval, self._next = agent, progress, interval, 0
+
+    def _on_step(self) -> bool:
+        if self.num_timesteps >= self._next:
+            self._next = self.num_timesteps + self._interval
+            self._progress(self.num_timesteps, self._agent)
+        return True
+
+
+@contextlib.contextmanager
+def _torch_threads(threads: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def tabular_actions(policy: Policy, states: StateIndex) -> Actions:
+    """(S,) the action that a policy takes, deterministically, in each state."""
+    actions, _ = policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)
+    return np.asarray(actions).astype(np.int64)

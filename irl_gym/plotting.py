@@ -1,0 +1,226 @@
+"""Figures: rewards, values, policies and learning curves. Only this module and its parts, `drawing`, import matplotlib.
+
+Grid environments are drawn as maps (`layouts.grid_layout` finds the map); the others as sorted lines and counts. They
+are made with matplotlib's objects, never with pyplot, so drawing changes no global state and needs no screen. Rewards
+have a diverging colour map centred on 0 (red below, blue above), values viridis; both are safe for the colour-blind.
+Axes: S states, A actions.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import CenteredNorm, Normalize
+from matplotlib.figure import Figure
+from scipy.sparse.linalg import lsmr
+
+from irl_gym import drawing
+from irl_gym._typing import ActionSets, Matrix, Vector
+from irl_gym.errors import InvalidParameter
+from irl_gym.layouts import GridLayout
+from irl_gym.mdp import TransitionTable
+from irl_gym.rewards import TabularReward
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A learning curve."""
+
+    steps: np.ndarray
+    """(N,) environment steps, increasing."""
+    values: np.ndarray
+    """(N,) what was reached."""
+    low: np.ndarray | None = None
+    """(N,) lower end of an interval band."""
+    high: np.ndarray | None = None
+    """(N,) its upper end."""
+
+
+def draw_rewards(layout: GridLayout | None, true: Vector | Matrix, learned: Vector | Matrix, table: TransitionTable) -> Figure:
+    """The environment's reward beside the learned one, each on its own scale.
+
+    A reward on states is what arrival pays. One on steps (S, A) is drawn like that too when some reward on states
+    explains it (FrozenLake's); else each cell of a map is cut into one triangle a move.
+
+    Args:
+        layout: the map, or None for an environment that has none.
+        true: (S,) paid on arrival, or (S, A) of steps.
+        learned: (S,) paid on arrival, or (S, A) of steps.
+        table: S states, A actions.
+    """
+    figure, axes = drawing.panels(layout)
+    for axis, name, R in ((axes[0], "True reward", true), (axes[1], "Learned reward", learned)):
+        on_states = R if R.ndim == 1 else arrival_reward(R, table)
+        if layout is None:
+            _draw_sorted_reward(axis, name, R if on_states is None else on_states, table)
+            continue
+        if on_states is None:
+            told = drawing.triangles(axis, layout, R)
+        else:
+            norm = CenteredNorm(0, halfrange=max(float(np.abs(on_states[table.reachable]).max()), 1e-9))
+            drawing.cells(axis, layout, on_states, cmap="RdBu", norm=norm, label="reward on arrival")
+            told = "paid on arrival in a cell"
+        axis.set_title(f"{name}, {told}")
+    if layout is not None:
+        drawing.footnote(figure, layout)
+    return figure
+
+
+def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: Vector, table: TransitionTable) -> Figure:
+    """The expert's discounted value under the true reward beside that under the learned reward.
+
+    Args:
+        layout: the map, or None for an environment that has none.
+        true_values: (S,) expected discounted sum of true rewards from each state.
+        learned_values: (S,) the same with the learned reward; its unit is the learned reward's.
+        table: S states.
+    """
+    figure, axes = drawing.panels(layout)
+    judged = table.reachable & ~table.terminal
+    if layout is None:
+        drawing.sorted_line(axes[0], true_values[judged])
+        axes[0].set(title="Expert's value under the true reward", xlabel="states, best first", ylabel="discounted value")
+        axes[1].scatter(true_values[judged], learned_values[judged], s=14, color=drawing.BLUE, alpha=0.55, linewidths=0)
+        axes[1].set(
+            title="The same states under the learned reward",
+            xlabel="expert's value, true reward", ylabel="expert's value, learned reward",
+        )  # fmt: skip
+        drawing.plain(axes[1])
+        return figure
+    titles = ("Expert's value, true reward", "Expert's value, learned reward")
+    for axis, title, V in zip(axes, titles, (true_values, learned_values), strict=True):
+        norm = Normalize(float(V[judged].min()), float(V[judged].max()))
+        drawing.cells(axis, layout, V, cmap="viridis", norm=norm, label="discounted value", ends=False)
+        axis.set_title(title)
+    drawing.footnote(figure, layout)
+    return figure
+
+
+def draw_policies(
+    layout: GridLayout | None, expert: ActionSets, retrained: Matrix, optimal: ActionSets, table: TransitionTable
+) -> Figure:
+    """The expert's actions beside the retrained agent's; where the agent's is not optimal the cell is shaded.
+
+    Args:
+        layout: the map, or None for an environment that has none.
+        expert: (S, A) the actions the expert takes.
+        retrained: (S, A) the agent's action probabilities; its most probable action is judged.
+        optimal: (S, A) all actions that are optimal under the true reward.
+        table: S states, A actions.
+    """
+    figure, axes = drawing.panels(layout)
+    judged = table.reachable & ~table.terminal
+    taken = retrained.argmax(axis=1)
+    wrong = judged & ~optimal[np.arange(table.n_states), taken]
+    told = f"{int((judged & ~wrong).sum())} of {int(judged.sum())} states"
+    if layout is None:
+        right, chosen = judged & ~wrong, np.eye(table.n_actions, dtype=bool)[taken]
+        drawing.action_counts(axes[0], {"expert": (expert & judged[:, None]).sum(axis=0)})
+        parts = {"optimal": (chosen & right[:, None]).sum(axis=0), "not optimal": (chosen & wrong[:, None]).sum(axis=0)}
+        drawing.action_counts(axes[1], parts)
+        several = (expert[judged].sum(axis=1) > 1).any()
+        axes[0].set_title("Expert" + (": every action of its set" if several else ""))
+        axes[1].set_title(f"Retrained agent, optimal in {told}")
+        axes[1].sharex(axes[0])
+        return figure
+    drawing.arrows(axes[0], layout, expert.astype(float), judged, np.zeros_like(judged))
+    axes[0].set_title("Expert")
+    drawing.arrows(axes[1], layout, retrained, judged, wrong)
+    axes[1].set_title(f"Retrained agent, optimal in {told}")
+    drawing.footnote(figure, layout, shaded="not optimal" if wrong.any() else "", policies=True)
+    return figure
+
+
+def draw_learning_curve(
+    curves: Mapping[str, Curve],
+    *,
+    expert: float,
+    random: float,
+    ylabel: str = "discounted value from the start, true reward",
+    title: str = "Learning curve",
+) -> Figure:
+    """What the agent reaches as it learns, between the random policy's and the expert's level.
+
+    Args:
+        curves: by the name to print, for example {"learned reward": ..., "true reward": ...}.
+        expert: the expert's level, in the unit of the curves.
+        random: the random policy's level.
+        ylabel: what the curves measure, with its unit.
+        title: printed above.
+
+    Raises:
+        InvalidParameter: no curve, or one whose values are not as many as its steps.
+    """
+    if not curves:
+        raise InvalidParameter("curves is empty: expected at least one curve.")
+    figure = drawing.blank(8.0, 4.6)
+    axis = figure.add_subplot()
+    for level, name, colour in ((expert, "expert", drawing.GREEN), (random, "random", drawing.GREY)):
+        axis.axhline(level, color=colour, linewidth=1.4, linestyle=(0, (5, 3)), zorder=1)
+        axis.annotate(
+            f"{name} {level:.4g}", (1, level), xytext=(5, 0), xycoords=("axes fraction", "data"),
+            textcoords="offset points", va="center", color=colour, annotation_clip=False,
+        )  # fmt: skip
+    for (name, curve), colour in zip(curves.items(), cycle(drawing.SERIES), strict=False):
+        if curve.steps.shape != curve.values.shape:
+            raise InvalidParameter(f"curve {name!r} has {curve.steps.size} steps and {curve.values.size} values.")
+        if curve.low is not None and curve.high is not None:
+            axis.fill_between(curve.steps, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
+        axis.plot(curve.steps, curve.values, color=colour, linewidth=2, label=name, marker="o", markersize=3)
+    if len(curves) > 1:
+        axis.legend(frameon=False)
+    axis.set(xlabel="environment steps", ylabel=ylabel, title=title)
+    axis.xaxis.set_major_formatter(lambda n, _: f"{n:,.0f}")
+    drawing.plain(axis)
+    return figure
+
+
+def save_figure(figure: Figure, path: str | os.PathLike) -> None:
+    """Write a png, svg or pdf beside, then rename. The same figure gives the same bytes: no date or version is written.
+
+    Raises:
+        InvalidParameter: another suffix.
+    """
+    path = Path(path)
+    kind = path.suffix.lower().lstrip(".")
+    blank: dict[str, dict[str, Any]] = {
+        "png": {"Software": None},
+        "svg": {"Date": None, "Creator": None},
+        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    }
+    if kind not in blank:
+        raise InvalidParameter(f"the path {path} ends in {path.suffix!r}: expected .png, .svg or .pdf.")
+    beside = path.with_name(f".{path.name}.tmp")
+    with matplotlib.rc_context({"svg.hashsalt": "irl_gym"}):
+        figure.savefig(beside, format=kind, dpi=130, metadata=blank[kind])
+    beside.replace(path)
+
+
+def arrival_reward(R: Matrix, table: TransitionTable) -> Vector | None:
+    """The reward on states that pays R in expectation in every step an episode can take, or None if there is none.
+
+    Args:
+        R: (S, A) reward of steps.
+        table: S states, A actions.
+    """
+    rows = np.repeat(table.reachable & ~table.terminal, table.n_actions)
+    wanted = R.ravel()[rows]
+    found = lsmr(table.P[rows], wanted, atol=1e-12, btol=1e-12, maxiter=20_000)[0]
+    explained = TabularReward(found).expected(table).ravel()[rows]
+    return found if np.abs(explained - wanted).max(initial=0) <= 1e-6 * np.abs(wanted).max(initial=0) else None
+
+
+def _draw_sorted_reward(axis: Axes, name: str, R: np.ndarray, table: TransitionTable) -> None:
+    """A reward where there is no map: every state or step, best first."""
+    if R.ndim == 1:
+        values, what, told = R[table.reachable], "states", "paid on arrival in a state"
+    else:
+        values, what, told = R[table.reachable & ~table.terminal].ravel(), "steps (s, a)", "paid for a step"
+    drawing.sorted_line(axis, values)
+    axis.set(title=f"{name}, {told}", xlabel=f"{values.size:,} {what}, best first", ylabel="reward")

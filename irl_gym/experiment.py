@@ -1,0 +1,64 @@
+"""What one run of the loop does: a frozen record, and its json."""
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, is_dataclass
+from typing import Any
+
+from irl_gym.errors import InvalidParameter
+from irl_gym.learners.base import Learner
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.planners import FOR_ADVANTAGES, SB3, Planner, ValueIteration
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What one run of the loop does.
+
+    Raises:
+        InvalidParameter: fewer than 1 episodes or copies.
+    """
+
+    env_id: str = "FrozenLake-v1"
+    """A registered environment; `module:id` for one of another package."""
+    gamma: float = 0.99
+    """Discount; the only default for it in the library, for the script's sake."""
+    env_kwargs: Mapping[str, Any] = field(default_factory=dict)
+    """Given to `gymnasium.make`."""
+    expert: Planner = field(default_factory=ValueIteration)
+    """Plans or learns under the true reward."""
+    episodes: int = 500
+    """Demonstrations recorded."""
+    learner: Learner = field(default_factory=lambda: FiniteLP(report_lambda_0=True))
+    """Recovers the reward."""
+    shaping: bool = True
+    """Retrain on the expected advantage under the learned reward, clipped at the margin cap; else on the reward as it is."""
+    retrain: Planner = field(default_factory=lambda: SB3(hyperparameters=FOR_ADVANTAGES))
+    """Plans or learns under the learned reward."""
+    num_envs: int = 64
+    """Copies of the environment that SB3 trains on."""
+    eval_episodes: int = 200
+    """Episodes for the mean returns."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        for name in ("episodes", "num_envs", "eval_episodes"):
+            if getattr(self, name) < 1:
+                raise InvalidParameter(f"{name} is {getattr(self, name)}: expected at least 1.")
+
+    @property
+    def name(self) -> str:
+        """A folder's name that no other experiment has: the environment and a digest of everything."""
+        digest = hashlib.sha256(json.dumps(self.to_json(), sort_keys=True).encode()).hexdigest()[:8]
+        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id)}-{digest}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The configuration as json; planners and learners with their class's name."""
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name, value in plain.items():
+            if is_dataclass(value) and not isinstance(value, type):
+                plain[name] = {"type": type(value).__name__, **asdict(value)}
+        return plain

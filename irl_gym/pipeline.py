@@ -1,0 +1,48 @@
+"""The closed loop in one call: environment -> expert -> Minari -> LP-IRL -> reward -> SB3 -> how good it is."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from irl_gym.experiment import Experiment
+from irl_gym.loop import STAGES, Loop, OnProgress
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a run found, as it stands in the run's folder."""
+
+    out: Path
+    """The folder."""
+    metrics: Mapping[str, Any]
+    """The content of metrics.json: policies, reward, training, table."""
+    certificate: Mapping[str, Any]
+    """The content of certificate.json."""
+    seconds: Mapping[str, float]
+    """Wall time of each stage, in the run that finished it."""
+
+
+def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progress: OnProgress | None = None) -> Report:
+    """Recover a reward from an expert, retrain an agent on it, and judge the agent under the true reward.
+
+    Leaves under `out`: config.json, expert.npz, dataset/ (Minari), reward.npz, certificate.json, agent.zip,
+    agent_policy.npz, learning_curve.csv, metrics.json, figures/. A run that was killed continues after its last stage.
+
+    Args:
+        experiment: what to do.
+        out: a new or empty folder, or one that holds this same experiment.
+        on_progress: called with a stage and the share of it that is done.
+
+    Raises:
+        UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made.
+        DegenerateExpert: no reward prefers the expert's actions.
+        SolverTimeout, SolverFailed: a linear program without an answer.
+        RunConflict: the folder holds another run.
+    """
+    loop = Loop(experiment, out, on_progress)
+    seconds = {name: float(loop.stage(name)["seconds"]) for name in STAGES}
+    content = json.loads((loop.folder.path / "metrics.json").read_text())
+    return Report(loop.folder.path, content, loop.certificate, seconds)

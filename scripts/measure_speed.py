@@ -1,0 +1,123 @@
+"""Measure the speed and memory bars: linear programs, planning, vectorised stepping, PPO, import.
+
+    python scripts/measure_speed.py
+
+Each measurement runs in a process of its own, so that its peak memory is its own. Ratios are of one run.
+"""
+
+import multiprocessing
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from stable_baselines3.common.env_util import make_vec_env
+
+from irl_gym import SB3, FiniteLP, TabularVecEnv, policy_iteration, tabulate, value_iteration
+
+GRID = "irl_gym_envs:irl_gym/GridWorld-v0"
+MEGABYTE = 1024  # of ru_maxrss, which counts kilobytes on Linux
+
+
+def grid(size: int, gamma: float):
+    """The table and step reward of a square grid with NR's slip of 0.3."""
+    env: Any = gym.make(GRID, size=size).unwrapped
+    mdp = env.mdp(gamma)
+    return mdp, env.reward.expected(mdp)
+
+
+def linear_program(size: int, gamma: float, **settings) -> str:
+    """Seconds of a fit and peak memory above what stood before it."""
+    mdp, R = grid(size, gamma)
+    expert = policy_iteration(mdp, R).policy
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    result = FiniteLP(**settings).fit(mdp, expert)
+    seconds = time.perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    gap = result.certificate.duality_gap
+    return f"{seconds:.2f} s, peak {peak / MEGABYTE:.0f} MB ({(peak - before) / MEGABYTE:.0f} above before), gap {gap:.0e}"
+
+
+def planning(size: int) -> str:
+    """Seconds and peak memory of planning on a large grid to 1e-6 in V; the table is not counted in the seconds."""
+    mdp, R = grid(size, 0.99)
+    start = time.perf_counter()
+    solution = value_iteration(mdp, R, tolerance=1e-6, sweeps=50)
+    seconds = time.perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
+    return f"{seconds:.1f} s, error bound {solution.error:.1e}, peak {peak:.0f} MB with the table"
+
+
+def lake(num_envs: int) -> TabularVecEnv:
+    """FrozenLake 8x8 as one vector environment."""
+    env = gym.make("FrozenLake-v1", map_name="8x8")
+    table = tabulate(env, gamma=0.99, check_steps=0)
+    return TabularVecEnv(table.mdp, table.reward, num_envs=num_envs, max_episode_steps=200, seed=0)
+
+
+def stepping() -> str:
+    """Steps a second of 512 copies under random actions."""
+    env = lake(512)
+    env.reset()
+    actions = np.random.default_rng(0).integers(4, size=(1000, 512))
+    start = time.perf_counter()
+    for _ in range(4):
+        for chosen in actions:
+            env.step(chosen)
+    return f"{4 * actions.size / (time.perf_counter() - start) / 1e6:.1f} million steps/s"
+
+
+SB3_OWN = {"n_steps": 2048, "batch_size": 64, "n_epochs": 10, "learning_rate": 3e-4, "policy_kwargs": None}
+
+
+def ppo(ours: dict, theirs: dict) -> str:
+    """PPO on 512 copies of the table against PPO on DummyVecEnv(8): environment steps a second, learning included."""
+    dummy = make_vec_env("FrozenLake-v1", 8, env_kwargs={"map_name": "8x8"})
+    rates = []
+    for env, settings, steps in ((lake(512), ours, 200_000), (dummy, theirs, 32_768)):
+        start = time.perf_counter()
+        steps = SB3("PPO", steps, settings).plan(env, gamma=0.99).model.num_timesteps
+        rates.append(steps / (time.perf_counter() - start))
+    return f"{rates[0]:,.0f} against {rates[1]:,.0f} steps/s: {rates[0] / rates[1]:.1f}x"
+
+
+def importing() -> str:
+    """Seconds of `import irl_gym` in a new interpreter, the median of 7."""
+    code = "import time; start = time.perf_counter(); import irl_gym; print(time.perf_counter() - start)"
+    made = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout) for _ in range(7)]
+    return f"{np.median(made):.3f} s"
+
+
+MEASUREMENTS: list[tuple[str, str, Callable[..., str], tuple, dict]] = [
+    ("import irl_gym", "< 0.3 s", importing, (), {}),
+    ("LP, 30x30, gamma 0.9, default", "< 1 s, < 500 MB", linear_program, (30, 0.9), {}),
+    ("LP, 30x30, gamma 0.9, NR lambda = 0", "< 1 s, < 500 MB", linear_program, (30, 0.9), {"margin_cap": None}),
+    ("LP, 100x100, gamma 0.99, default", "< 20 s, < 500 MB", linear_program, (100, 0.99), {}),
+    ("LP, 100x100, gamma 0.99, NR lambda = 0", "< 20 s, < 500 MB", linear_program, (100, 0.99), {"margin_cap": None}),
+    ("TabularVecEnv, 512 copies, FrozenLake 8x8", ">= 2 million steps/s", stepping, (), {}),
+    ("PPO, irl_gym's defaults, against SB3's on DummyVecEnv(8)", ">= 8x", ppo, ({}, SB3_OWN), {}),
+    (
+        "the same, SB3's network and 10 epochs on both",
+        ">= 8x",
+        ppo,
+        ({**SB3_OWN, "n_steps": 8, "batch_size": 4096}, SB3_OWN),
+        {},
+    ),
+    ("the same, irl_gym's defaults on both", "reported", ppo, ({}, {}), {}),
+    ("planning, 1,000,000 states, gamma 0.99", "< 30 s, < 2000 MB", planning, (1000,), {}),
+]
+
+
+if __name__ == "__main__":
+    shown = Table("what", "bar", "measured")
+    for name, bar, measure, arguments, settings in MEASUREMENTS:
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            shown.add_row(name, bar, pool.apply(measure, arguments, settings))
+    Console(width=150).print(shown)

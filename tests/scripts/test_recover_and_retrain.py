@@ -1,0 +1,87 @@
+"""The script as a person runs it, by subprocess."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "scripts" / "recover_and_retrain.py"
+QUICK = ("--total-timesteps", "4096", "--episodes", "10")
+
+
+def command(*arguments):
+    return [sys.executable, str(SCRIPT), *arguments]
+
+
+def run(*arguments, cwd):
+    return subprocess.run(command(*arguments), cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    cwd = tmp_path_factory.mktemp("script")
+    return run(*QUICK, "--env-kwargs", "is_slippery=false", cwd=cwd), cwd
+
+
+def test_the_script_ends_well(finished):
+    assert finished[0].returncode == 0, finished[0].stderr
+
+
+@pytest.mark.parametrize("word", ["expert", "random", "retrained", "worst-tie regret", "lambda_0", "agreement", "seconds"])
+def test_the_report_names(finished, word):
+    assert word in finished[0].stdout
+
+
+def test_the_script_is_quiet_when_not_on_a_terminal(finished):
+    assert finished[0].stderr == "" and "\x1b" not in finished[0].stdout
+
+
+def test_each_experiment_gets_a_folder_of_its_own(finished):
+    _, cwd = finished
+    assert len(list((cwd / "runs").iterdir())) == 1
+    run(*QUICK, "--retrain", "value-iteration", cwd=cwd)
+    assert len(list((cwd / "runs").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--env-id", "FrozenLaek-v1"), "UnknownEnvironment: environment 'FrozenLaek-v1'"),
+        (("--gamma", "1.5"), "InvalidDiscount: gamma is 1.5"),
+        (("--l1", "-1"), "InvalidParameter: l1 is -1"),
+        (("--env-kwargs", "8x8"), "InvalidParameter: --env-kwargs has '8x8'"),
+        (("--env-kwargs", "{broken"), "InvalidParameter: --env-kwargs is '{broken'"),
+        (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
+        (("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true"), "NotTabular: fickle_passenger"),
+        (("--env-id", "Pendulum-v1"), "NotDiscrete"),
+    ],
+)
+def test_a_mistake_gets_one_clear_line(tmp_path, arguments, says):
+    made = run(*arguments, cwd=tmp_path)
+    assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
+
+
+def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):
+    (held,) = sorted((finished[1] / "runs").iterdir())[:1]
+    made = run("--out", str(held), "--seed", "7", cwd=tmp_path)
+    assert made.returncode == 2 and "RunConflict" in made.stderr
+
+
+def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
+    arguments = ("--out", "run", "--episodes", "10", "--total-timesteps", "100000")
+    process = subprocess.Popen(command(*arguments), cwd=tmp_path, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not (tmp_path / "run" / ".stages" / "reward.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    kept = (tmp_path / "run" / "reward.npz").stat().st_mtime_ns
+    assert not (tmp_path / "run" / "metrics.json").exists()
+    made = run(*arguments, cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept

@@ -1,0 +1,163 @@
+"""The closed loop, on small budgets: what it leaves, that it continues, and that the same seed gives the same bytes."""
+
+import json
+
+import minari
+import numpy as np
+import pytest
+
+from irl_gym.datasets import minari_root
+from irl_gym.errors import DegenerateExpert, InvalidParameter, NotTabular, RunConflict, UnknownEnvironment
+from irl_gym.experiment import Experiment
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.loop import Loop
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import SB3, ValueIteration, load_agent
+from irl_gym.rewards import TabularReward
+
+FILES = (
+    "config.json", "expert.npz", "reward.npz", "certificate.json", "agent.zip", "agent_policy.npz", "learning_curve.csv",
+    "metrics.json", "figures/rewards.png", "figures/values.png", "figures/policies.png", "figures/learning_curve.png",
+)  # fmt: skip
+SMALL = {"episodes": 20, "eval_episodes": 20, "num_envs": 16, "env_kwargs": {"is_slippery": False}}
+
+
+def small(**kwargs):
+    return Experiment(**{"retrain": SB3(total_timesteps=30_000), **SMALL, **kwargs})
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    return recover_and_retrain(small(), tmp_path_factory.mktemp("loop") / "run")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_run_leaves(report, name):
+    assert (report.out / name).stat().st_size > 0
+
+
+def test_a_run_leaves_nothing_half_written(report):
+    assert not [path for path in report.out.rglob("*") if ".tmp" in path.name or path.name.startswith(".writing")]
+
+
+def test_a_run_leaves_a_dataset_that_plain_minari_opens(report):
+    with minari_root(report.out / "dataset"):
+        dataset = minari.load_dataset("irl_gym/frozenlake-v1-expert-v0")
+        assert (dataset.total_episodes, dataset.recover_environment().spec.id) == (20, "FrozenLake-v1")
+
+
+def test_the_retrained_agent_is_as_good_as_the_expert(report):
+    assert report.metrics["policies"]["retrained"]["score"] > 0.95
+
+
+def test_the_scale_of_the_score_is_set_by_random_and_expert(report):
+    policies = report.metrics["policies"]
+    assert (policies["random"]["score"], policies["expert"]["score"]) == (0.0, 1.0)
+
+
+def test_the_expert_agrees_with_its_own_set(report):
+    assert report.metrics["policies"]["expert"]["agreement"] == 1.0
+
+
+def test_mean_returns_lie_in_their_intervals(report):
+    for row in report.metrics["policies"].values():
+        assert row["return_low"] <= row["mean_return"] <= row["return_high"]
+
+
+def test_the_agent_saved_is_the_agent_judged(report):
+    agent = load_agent(report.out / "agent.zip", "PPO")
+    actions, _ = agent.predict(np.arange(16), deterministic=True)
+    assert np.array_equal(actions, np.load(report.out / "agent_policy.npz")["actions"])
+
+
+def test_the_certificate_is_that_of_the_reward(report):
+    reward = TabularReward.load(report.out / "reward.npz")
+    assert report.certificate["expert_optimal"] and reward.values.shape == (16,)
+
+
+def test_the_same_seed_gives_the_same_bytes(report, tmp_path):
+    again = recover_and_retrain(small(), tmp_path / "run")
+    names = [name for name in FILES if name != "agent.zip"]  # a zip holds the time it was made
+    data = "dataset/irl_gym/frozenlake-v1-expert-v0/data/main_data.hdf5"
+    differing = [name for name in [*names, data] if (report.out / name).read_bytes() != (again.out / name).read_bytes()]
+    assert differing == []
+
+
+def test_a_finished_run_is_read_not_run_again(report):
+    before = {path: path.stat().st_mtime_ns for path in report.out.rglob("*")}
+    assert recover_and_retrain(small(), report.out).metrics == report.metrics
+    assert {path: path.stat().st_mtime_ns for path in report.out.rglob("*")} == before
+
+
+def test_a_run_that_stopped_continues_after_its_last_stage(report, tmp_path):
+    first = Loop(small(), tmp_path / "run")
+    for stage in ("expert", "demonstrations", "reward"):
+        first.stage(stage)
+    kept = (tmp_path / "run" / "reward.npz").stat().st_mtime_ns
+    again = recover_and_retrain(small(), tmp_path / "run")
+    assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept
+    assert again.metrics == report.metrics
+
+
+def test_another_experiment_in_the_same_folder_is_refused(report):
+    with pytest.raises(RunConflict, match="seed is 0, this one's is 1"):
+        recover_and_retrain(small(seed=1), report.out)
+
+
+def test_progress_reaches_the_end_of_each_stage(tmp_path):
+    seen = {}
+    recover_and_retrain(small(retrain=ValueIteration()), tmp_path, lambda stage, share: seen.update({stage: share}))
+    assert set(seen) == {"table", "expert", "demonstrations", "reward", "agent", "metrics", "figures"}
+    assert set(seen.values()) == {1.0}
+
+
+def test_a_planner_on_the_recovered_reward_is_optimal(tmp_path):
+    made = recover_and_retrain(small(retrain=ValueIteration(), shaping=False), tmp_path)
+    assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
+
+
+def test_an_sb3_expert_can_demonstrate(tmp_path):
+    made = recover_and_retrain(small(expert=SB3(total_timesteps=60_000), retrain=ValueIteration()), tmp_path)
+    assert made.metrics["policies"]["retrained"]["value"] == pytest.approx(made.metrics["policies"]["expert"]["value"])
+
+
+def test_an_environment_that_pays_by_luck_is_stepped(tmp_path):
+    made = recover_and_retrain(
+        Experiment(env_id="CliffWalkingSlippery-v1", episodes=5, eval_episodes=5, retrain=ValueIteration(),
+                   learner=FiniteLP(reward_on="state-action")), tmp_path,
+    )  # fmt: skip
+    assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
+
+
+def test_our_own_environments_work_by_module_and_id(tmp_path):
+    asked = Experiment(env_id="irl_gym_envs:irl_gym/GridWorld-v0", episodes=5, eval_episodes=5, retrain=ValueIteration())
+    assert recover_and_retrain(asked, tmp_path).metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "error", "match"),
+    [("FrozenLaek-v1", UnknownEnvironment, "FrozenLake-v1"), ("Blackjack-v1", NotTabular, "Blackjack")],
+)
+def test_an_environment_that_cannot_be_used_is_refused_before_anything_is_written(tmp_path, env_id, error, match):
+    with pytest.raises(error, match=match):
+        recover_and_retrain(Experiment(env_id=env_id), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_expert_that_no_reward_explains_stops_the_run_with_its_reason(tmp_path):
+    from irl_gym_envs.grid_world import GridWorldEnv  # noqa: F401  (registers)
+
+    corridor = {"size": [1, 2], "slip": 1.0, "goals": [[0, 1]], "start": [0, 0], "terminal_goal": False}
+    asked = Experiment(env_id="irl_gym_envs:irl_gym/GridWorld-v0", env_kwargs=corridor, episodes=1)
+    with pytest.raises(DegenerateExpert, match="state-action"):
+        recover_and_retrain(asked, tmp_path)
+
+
+@pytest.mark.parametrize("wrong", [{"episodes": 0}, {"num_envs": 0}, {"eval_episodes": -1}])
+def test_an_experiment_refuses_nothing_to_do(wrong):
+    with pytest.raises(InvalidParameter, match=next(iter(wrong))):
+        Experiment(**wrong)
+
+
+def test_the_configuration_is_json():
+    assert json.loads(json.dumps(small().to_json()))["learner"]["type"] == "FiniteLP"

@@ -1,0 +1,85 @@
+"""A run's folder: stages are done once, whole or not at all, and another run is refused."""
+
+import json
+
+import pytest
+
+from irl_gym.errors import RunConflict
+from irl_gym.run_folder import RunFolder
+
+CONFIG = {"env_id": "A-v0", "seed": 1}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return RunFolder(tmp_path / "run", CONFIG)
+
+
+def writing(content):
+    def make(beside):
+        (beside / "a.txt").write_text(content)
+        (beside / "deep").mkdir()
+        (beside / "deep" / "b.txt").write_text(content)
+        return {"content": content}
+
+    return make
+
+
+def test_a_stages_files_are_in_place_after_it(folder):
+    folder.run("one", writing("x"))
+    assert ((folder.path / "a.txt").read_text(), (folder.path / "deep" / "b.txt").read_text()) == ("x", "x")
+
+
+def test_a_finished_stage_is_not_run_again(folder):
+    folder.run("one", writing("x"))
+    assert folder.run("one", writing("y"))["content"] == "x"
+
+
+def test_a_finished_stage_is_known_to_a_later_run(folder):
+    folder.run("one", writing("x"))
+    assert RunFolder(folder.path, CONFIG).done("one")
+
+
+def test_a_stage_that_fails_leaves_none_of_its_files_in_place(folder):
+    def failing(beside):
+        writing("x")(beside)
+        raise RuntimeError("power cut")
+
+    with pytest.raises(RuntimeError, match="power cut"):
+        folder.run("one", failing)
+    assert not (folder.path / "a.txt").exists() and not folder.done("one")
+
+
+def test_a_stage_that_failed_can_be_run_again(folder):
+    with pytest.raises(ZeroDivisionError):
+        folder.run("one", lambda beside: {"x": 1 / 0})
+    assert folder.run("one", writing("x"))["content"] == "x"
+
+
+def test_a_stage_killed_between_renaming_and_its_record_is_run_again_over_its_files(folder):
+    folder.run("one", writing("x"))
+    (folder.path / ".stages" / "one.json").unlink()
+    folder.run("one", writing("y"))
+    assert (folder.path / "deep" / "b.txt").read_text() == "y"
+
+
+def test_the_configuration_is_kept(folder):
+    assert json.loads((folder.path / "config.json").read_text()) == CONFIG
+
+
+def test_another_configuration_is_refused_by_the_key_that_differs(folder):
+    with pytest.raises(RunConflict, match="its seed is 1, this one's is 2"):
+        RunFolder(folder.path, {**CONFIG, "seed": 2})
+
+
+def test_a_folder_that_holds_no_run_is_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(RunConflict, match="holds no run"):
+        RunFolder(tmp_path, CONFIG)
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "\x00"])
+def test_a_broken_configuration_is_refused(tmp_path, content):
+    (tmp_path / "config.json").write_text(content)
+    with pytest.raises(RunConflict, match="Choose another --out"):
+        RunFolder(tmp_path, CONFIG)

@@ -5,6 +5,7 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 """
 
 import contextlib
+import json
 import os
 import shutil
 import tempfile
@@ -17,6 +18,7 @@ import gymnasium as gym
 import minari
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from minari.data_collector import EpisodeBuffer
 from minari.dataset.minari_dataset import parse_dataset_id
 from minari.storage.datasets_root_dir import get_dataset_path
@@ -124,19 +126,24 @@ def _buffer(episode: Episode, first_action: int) -> EpisodeBuffer:
 
 
 def read_minari(
-    dataset: minari.MinariDataset | str, *, states: StateIndex | None = None, root: str | os.PathLike | None = None
+    dataset: minari.MinariDataset | str,
+    *,
+    states: StateIndex | None = None,
+    env: gym.Env | None = None,
+    root: str | os.PathLike | None = None,
 ) -> Iterator[Episode]:
     """Read the episodes of a Minari dataset with discrete actions, one at a time.
 
     Args:
         dataset: a dataset, or the id of one under `root`.
         states: refuse a dataset whose observations are not this index's.
+        env: refuse a dataset recorded in another environment, by id and arguments.
         root: Minari's root folder; None for the one in force.
 
     Raises:
         FileNotFoundError: no dataset of that id.
         NotDiscrete: continuous actions.
-        DatasetMismatch: recorded in an environment with other observations.
+        DatasetMismatch: recorded in another environment, or one with other observations.
     """
     if isinstance(dataset, str):
         with minari_root(root):
@@ -149,9 +156,23 @@ def read_minari(
             f"dataset {dataset.spec.dataset_id!r} was recorded in an environment with observations "
             f"{dataset.spec.observation_space}: expected {states.space}. Is it another environment's?"
         )
+    if env is not None and _identity(dataset.env_spec) != _identity(env.spec):
+        raise DatasetMismatch(
+            f"dataset {dataset.spec.dataset_id!r} was recorded in {_identity(dataset.env_spec)}: expected "
+            f"{_identity(env.spec)}. Make the environment with `dataset.recover_environment()`."
+        )
     first = int(actions.start)
     for episode in dataset.iterate_episodes():
         yield Episode(
             episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, np.asarray(episode.rewards, float),
             bool(episode.terminations[-1]), bool(episode.truncations[-1]),
         )  # fmt: skip
+
+
+def _identity(spec: EnvSpec | None) -> tuple[str, dict[str, Any]] | None:
+    """What makes an environment this one: its id and arguments, but for how it is shown."""
+    if spec is None:
+        return None
+    kwargs = json.loads(json.dumps(spec.kwargs))
+    kwargs.pop("render_mode", None)
+    return spec.id, kwargs

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass
 from typing import Any
 
@@ -62,3 +62,26 @@ class Experiment:
             if is_dataclass(value) and not isinstance(value, type):
                 plain[name] = {"type": type(value).__name__, **asdict(value)}
         return plain
+
+
+def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
+    """Arguments of an environment given as text: `name=value` pairs, each value json or plain text; or one json object.
+
+    Raises:
+        InvalidParameter: neither.
+    """
+    if len(parts) == 1 and parts[0].lstrip().startswith("{"):
+        try:
+            return json.loads(parts[0])
+        except json.JSONDecodeError as error:
+            raise InvalidParameter(f"env-kwargs is {parts[0]!r}, not json ({error}): expected an object.") from error
+    found: dict[str, Any] = {}
+    for part in parts:
+        name, equals, text = part.partition("=")
+        if not equals or not name.isidentifier():
+            raise InvalidParameter(f"env-kwargs has {part!r}: expected name=value, such as map_name=8x8.")
+        try:
+            found[name] = json.loads(text)
+        except json.JSONDecodeError:
+            found[name] = text
+    return found

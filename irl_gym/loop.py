@@ -14,6 +14,7 @@ import csv
 import json
 import os
 import re
+import time
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -63,7 +64,9 @@ class Loop:
         self.env = make(experiment.env_id, **experiment.env_kwargs)
         self.report_progress = on_progress or (lambda stage, share: None)
         self.report_progress("table", 0.0)
+        start = time.perf_counter()
         self.table: Tabulation = tabulate(self.env, gamma=experiment.gamma, seed=experiment.seed)
+        self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(out, experiment.to_json())
         self.report_progress("table", 1.0)
 
@@ -123,7 +126,7 @@ class Loop:
         policy = self._train(planner, self.table.reward, self._share("expert", planner))
         _save_policy(policy, folder / "expert")
         np.savez(folder / "expert.npz", actions=tabular_actions(policy, self.table.states))
-        return {"planner": type(planner).__name__}
+        return {"planner": type(planner).__name__, **_steps(policy)}
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a tabular policy in the environment: from the table where it holds every reward, else by stepping."""
@@ -156,7 +159,7 @@ class Loop:
             random_return=float(np.mean([episode.total_reward for episode in chance])),
             expert_return=float(np.mean([episode.total_reward for episode in recorded])),
         )  # fmt: skip
-        return {"dataset_id": dataset_id, "episodes": len(recorded), "steps": sum(map(len, recorded))}
+        return {"dataset_id": dataset_id, "episodes": len(recorded), "environment_steps": sum(map(len, recorded))}
 
     def _make_reward(self, folder: Path) -> dict[str, Any]:
         result = self.experiment.learner.fit(self.table.mdp, self.expert_actions)
@@ -192,7 +195,7 @@ class Loop:
         np.savez(folder / "agent_policy.npz", actions=actions)
         with (folder / "learning_curve.csv").open("w", newline="") as file:
             csv.writer(file).writerows([("environment_steps", "true_value"), *curve])
-        return {"planner": type(planner).__name__, "environment_steps": curve[-1][0] if curve else 0}
+        return {"planner": type(planner).__name__, **_steps(policy)}
 
     def true_value(self, policy: Any) -> float:
         """Exact discounted value of a tabular policy from d0 under the true reward."""
@@ -218,6 +221,11 @@ def _save_policy(policy: Policy, stem: Path) -> None:
     """Keep an agent in SB3's own zip; a table of actions needs no more than its npz."""
     if isinstance(policy, Agent):
         policy.save(stem.with_suffix(".zip"))
+
+
+def _steps(policy: Policy) -> dict[str, int]:
+    """Environment steps that a policy was trained on."""
+    return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0}
 
 
 def dataset_name(env_id: str) -> str:

@@ -21,8 +21,8 @@ class Report:
     """The content of metrics.json: policies, reward, training, table."""
     certificate: Mapping[str, Any]
     """The content of certificate.json."""
-    seconds: Mapping[str, float]
-    """Wall time of each stage, in the run that finished it."""
+    stages: Mapping[str, Mapping[str, Any]]
+    """The record of each stage: wall seconds in the run that finished it, environment steps, what the solver did."""
 
 
 def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progress: OnProgress | None = None) -> Report:
@@ -43,6 +43,6 @@ def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progr
         RunConflict: the folder holds another run.
     """
     loop = Loop(experiment, out, on_progress)
-    seconds = {name: float(loop.stage(name)["seconds"]) for name in STAGES}
+    stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
     content = json.loads((loop.folder.path / "metrics.json").read_text())
-    return Report(loop.folder.path, content, loop.certificate, seconds)
+    return Report(loop.folder.path, content, loop.certificate, stages)

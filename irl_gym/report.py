@@ -67,12 +67,12 @@ def _stages(report: Report) -> Table:
     table = Table(title="Stages", title_justify="left", title_style="bold")
     table.add_column("stage")
     table.add_column("seconds", justify="right")
-    table.add_column("steps", justify="right")
-    for name, seconds in report.seconds.items():
-        steps = ""
-        if name == "agent":
+    table.add_column("environment steps", justify="right")
+    for name, record in report.stages.items():
+        taken = record.get("environment_steps", 0)
+        steps = f"{taken:,}" if taken else ""
+        if name == "agent" and taken:
             crossing = training["steps_to_0.9"]
-            reached = "0.9 not reached" if crossing is None else f"score 0.9 at {crossing:,}"
-            steps = f"{training['environment_steps']:,} ({reached})"
-        table.add_row(name, f"{seconds:.1f}", steps)
+            steps += " (never at score 0.9)" if crossing is None else f" (score 0.9 after {crossing:,})"
+        table.add_row(name, f"{record['seconds']:.1f}", steps)
     return table

@@ -4,7 +4,6 @@ python scripts/recover_and_retrain.py --env-id Taxi-v4
 python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 is_slippery=true
 """
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from irl_gym import SB3, Experiment, FiniteLP, IrlGymError, ValueIteration, recover_and_retrain
-from irl_gym.errors import InvalidParameter
+from irl_gym.experiment import parse_keywords
 from irl_gym.planners import FOR_ADVANTAGES, Algorithm, Planner
 from irl_gym.report import print_report
 
@@ -94,7 +93,7 @@ def experiment(arguments: Arguments) -> Experiment:
     )
     return Experiment(
         env_id=arguments.env_id,
-        env_kwargs=keywords(arguments.env_kwargs),
+        env_kwargs=parse_keywords(arguments.env_kwargs),
         gamma=arguments.gamma,
         expert=planner(arguments.expert, arguments.total_timesteps),
         episodes=arguments.episodes,
@@ -110,27 +109,6 @@ def planner(name: PlannerName, total_timesteps: int, *, advantages: bool = False
     if name not in ALGORITHMS:
         return ValueIteration()
     return SB3(ALGORITHMS[name], total_timesteps, FOR_ADVANTAGES if advantages and name == "ppo" else {})
-
-
-def keywords(parts: tuple[str, ...]) -> dict[str, Any]:
-    """`name=value` pairs, each value json or plain text; or one json object."""
-    if len(parts) == 1 and parts[0].lstrip().startswith("{"):
-        return as_json(parts[0], strict=True)
-    pairs = [part.partition("=") for part in parts]
-    wrong = [name + equals + text for name, equals, text in pairs if not equals or not name.isidentifier()]
-    if wrong:
-        raise InvalidParameter(f"--env-kwargs has {wrong[0]!r}: expected name=value, such as map_name=8x8.")
-    return {name: as_json(text) for name, _, text in pairs}
-
-
-def as_json(text: str, *, strict: bool = False) -> Any:
-    """Text as json; as it is when it is none, unless that is a mistake."""
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
-        if strict:
-            raise InvalidParameter(f"--env-kwargs is {text!r}, not json ({error}): expected an object.") from error
-        return text
 
 
 if __name__ == "__main__":

@@ -108,6 +108,15 @@ def test_a_dataset_of_another_environment_is_refused(root):
         next(read_minari(ID, root=root, states=StateIndex(spaces.Discrete(64))))
 
 
+def test_a_dataset_of_the_same_environment_is_read(root, env):
+    assert sum(1 for _ in read_minari(ID, root=root, env=env)) == 5
+
+
+def test_a_dataset_of_an_environment_made_otherwise_is_refused(root):
+    with pytest.raises(DatasetMismatch, match=r"'is_slippery': False.*'is_slippery': True"):
+        next(read_minari(ID, root=root, env=gym.make("FrozenLake-v1", is_slippery=True)))
+
+
 def test_continuous_actions_are_refused(tmp_path):
     env = gym.make("Pendulum-v1")
     one = Episode(np.zeros((2, 3), dtype=np.float32), np.zeros((1, 1), dtype=np.float32), np.zeros(1), False, True)

@@ -32,8 +32,8 @@ def _policies(report: Report) -> Table:
         interval = f"{row['mean_return']:.4g} ({row['return_low']:.4g} to {row['return_high']:.4g})"
         table.add_row(name, f"{row['value']:.4f}", score, interval, f"{row['agreement']:.1%}")
     table.caption = (
-        "value: exact, discounted, from the start. score: random = 0, expert = 1. agreement: share of states with one of the "
-        "expert's actions. retrained: on the recovered reward alone."
+        "value: exact, discounted, from the start. score: random = 0, expert = 1. mean return: undiscounted, sampled. "
+        "agreement: share of states with one of the expert's actions. retrained: on the recovered reward alone."
     )
     table.caption_justify = "left"
     return table

@@ -1,8 +1,10 @@
 """Any discrete environment to an exact transition table.
 
-`tabulate(env, gamma=...)` asks each source in `SOURCES` in turn; today there is one, the table an environment publishes as
-`env.unwrapped.P[s][a] = [(probability, successor, reward, terminated), ...]`. Such a `P` is not the whole truth: the rows
-of terminal states carry self-loops or ordinary moves, and successors stand in it more than once. So:
+`tabulate(env, gamma=...)` asks each source in `SOURCES` in turn; today there are two: an environment that is a table
+(TabularEnv), and the table that an environment publishes as
+    env.unwrapped.P[s][a] = [(probability, successor, reward, terminated), ...]
+Such a `P` is not the whole truth: the rows of terminal states carry self-loops or ordinary moves, and successors stand in it
+more than once. So:
     duplicates are added up; a state entered with `terminated` becomes terminal, its rows zero;
     a state that episodes enter both with and without `terminated` is split into an ordinary row and a terminal copy;
     states that no episode visits are never a reason to split (Taxi's end states are entered both ways, but only from there);
@@ -27,6 +29,7 @@ from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.rewards import TabularReward
 from irl_gym.selfcheck import SelfCheck, compare_with_steps
 from irl_gym.states import StateIndex
+from irl_gym.tabular_env import TabularEnv
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,21 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         ) from error
 
 
+def _own(env: gym.Env, gamma: float) -> Tabulation | None:
+    """The table of a TabularEnv, which is one."""
+    base = env.unwrapped
+    if not isinstance(base, TabularEnv):
+        return None
+    mdp = base.mdp(gamma)
+    rows = np.repeat(np.arange(mdp.P.shape[0]), np.diff(mdp.P.indptr))
+    states, actions = np.divmod(rows, mdp.n_actions)
+    paid = np.asarray(base.reward.pay(states, actions, mdp.P.indices), dtype=np.float64)
+    R, deviation = _moments(rows, mdp.P.data, paid, (mdp.n_states, mdp.n_actions))
+    evidence = Evidence("The environment is its table (TabularEnv).", exact=True, merged=0, split=0, check=None)
+    index = StateIndex(base.observation_space)
+    return Tabulation(mdp, TabularReward(R, {"source": "environment"}), deviation, paid, index, evidence)
+
+
 def _published(env: gym.Env, gamma: float) -> Tabulation | None:
     """The table in `env.unwrapped.P`."""
     base = env.unwrapped
@@ -238,11 +256,7 @@ def _assemble(entries: _Entries, d0: np.ndarray, space: spaces.Space, gamma: flo
     P = sp.coo_array((entries.probability[kept], (rows, successor[kept])), shape=shape)
     mdp = TabularMDP(P, gamma, np.append(d0, np.zeros(len(copies))))
     p, r = entries.probability[kept], entries.reward[kept]
-    R, square = (
-        np.bincount(rows, weights=p * moment, minlength=size * n_actions).reshape(size, n_actions) for moment in (r, r**2)
-    )
-    variance = square - R**2
-    deviation = np.sqrt(np.where(variance > 1e-12 * np.maximum(square, 1), variance, 0.0))
+    R, deviation = _moments(rows, p, r, (size, n_actions))
     paid = _entry_rewards(mdp.P, rows, successor[kept], p, r)
     evidence = Evidence(
         method="The table that the environment publishes as P, with terminal rows zeroed and duplicates added up.",
@@ -250,6 +264,13 @@ def _assemble(entries: _Entries, d0: np.ndarray, space: spaces.Space, gamma: flo
     )  # fmt: skip
     states = StateIndex(space, terminal_copies=copies)
     return Tabulation(mdp, TabularReward(R, {"source": "environment"}), deviation, paid, states, evidence)
+
+
+def _moments(rows: np.ndarray, p: np.ndarray, r: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """(S, A) mean and standard deviation of what a step pays, from lines of row, probability and reward."""
+    R, square = (np.bincount(rows, weights=p * moment, minlength=shape[0] * shape[1]).reshape(shape) for moment in (r, r**2))
+    variance = square - R**2
+    return R, np.sqrt(np.where(variance > 1e-12 * np.maximum(square, 1), variance, 0.0))
 
 
 def _entry_rewards(P: Sparse, rows: np.ndarray, columns: np.ndarray, p: np.ndarray, r: np.ndarray) -> np.ndarray | None:
@@ -260,5 +281,5 @@ def _entry_rewards(P: Sparse, rows: np.ndarray, columns: np.ndarray, p: np.ndarr
     return mean if np.allclose(mean[position], r, rtol=1e-9, atol=1e-12) else None
 
 
-SOURCES: tuple[Source, ...] = (_published,)
+SOURCES: tuple[Source, ...] = (_own, _published)
 """Asked in turn for a table; the first answer is taken."""

@@ -27,7 +27,8 @@ wheel: $(READY)
 	$(BIN)/python -m build --wheel --outdir dist . > /dev/null
 	$(BIN)/check-wheel-contents dist
 
-bars: $(READY)  ## the measured bars: speed, memory, retraining on every environment (about 10 minutes)
+bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment (about 8 minutes)
+	$(BIN)/python -m pytest -m slow
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
 

@@ -8,7 +8,6 @@ sum y margins with respect to R. So D(y) - objective bounds what the reward fall
 Axes: S states, A actions, n rows of (4).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,6 +64,26 @@ class Certificate:
     def degenerate(self) -> bool:
         """Is R zero or constant?"""
         return self.zero or self.constant
+
+    def __str__(self) -> str:
+        """The certificate in a few lines a person reads."""
+        finite = self.margin[np.isfinite(self.margin)]
+        optimal = "yes" if self.expert_optimal else f"no, (4) is violated by {self.worst_violation:.2e}"
+        span = f"{finite.min():.3g} to {finite.max():.3g} in {finite.size} states" if finite.size else "none"
+        lines = [
+            f"expert optimal under R   {optimal}",
+            f"margins                  {span}",
+            f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
+        ]
+        if self.degenerate:
+            lines.append(f"degenerate               R is {'zero' if self.zero else 'constant'}")
+        if self.inseparable.size:
+            lines.append(
+                f"same successors          in {self.inseparable.size} states an action that no state reward tells apart"
+            )
+        if self.marginless.size:
+            lines.append(f"no margin                in {self.marginless.size} states, where ties remain")
+        return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
         """The certificate as json holds it: NaN becomes None."""
@@ -156,7 +175,7 @@ def certify(
         worst_violation=worst,
         margin=margin,
         objective=total - l1 * float(np.abs(R.values).sum()),
-        dual_bound=_dual_bound(part, comparisons, R.on_states, objective_states, r_max, l1, margin_cap, y),
+        dual_bound=_Dual(part, comparisons, R.on_states, objective_states, r_max, l1, margin_cap).bound(y),
         l1=float(l1),
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if margin_cap is None else float(margin_cap),
@@ -185,63 +204,43 @@ def _objective_states(
     return states
 
 
-def _dual_bound(
-    mdp: TabularMDP,
-    comparisons: Comparisons,
-    on_states: bool,
-    objective_states: np.ndarray,
-    r_max: float,
-    l1: float,
-    cap: float | None,
-    y: np.ndarray | None,
-) -> float:
-    """The least D(y) over the sign of the equalities' duals, which solvers leave open."""
-    if y is None:
-        return float("nan")
-    bounds = []
-    for sign in (1.0, -1.0):
-        signed = np.where(comparisons.equal, sign * y, np.maximum(y, 0.0))
-        bounds.append(_lagrange(mdp, comparisons, on_states, objective_states, r_max, l1, cap, signed))
-    return min(bounds)
+@dataclass(frozen=True, eq=False)
+class _Dual:
+    """Lagrange's bound for one program."""
 
+    mdp: TabularMDP
+    comparisons: Comparisons
+    on_states: bool
+    objective_states: np.ndarray
+    r_max: float
+    l1: float
+    cap: float | None
 
-def _lagrange(
-    mdp: TabularMDP,
-    comparisons: Comparisons,
-    on_states: bool,
-    objective_states: np.ndarray,
-    r_max: float,
-    l1: float,
-    cap: float | None,
-    y: np.ndarray,
-) -> float:
-    most = 2 * r_max / (1 - mdp.gamma) if cap is None else cap
-    per_state = np.bincount(comparisons.states, weights=np.where(comparisons.equal, 0.0, y), minlength=mdp.n_states)
-    slack = most * float(np.maximum(1 - per_state[objective_states], 0.0).sum())
-    P_pi = mdp.P_pi(comparisons.distribution)
-    if on_states:
-        c = solve_discounted(P_pi, mdp.gamma, comparisons.rows.T @ y, transpose=True)
-    else:
+    def bound(self, y: np.ndarray | None) -> float:
+        """The least D(y) over the sign of the equalities' duals, which solvers leave open."""
+        if y is None:
+            return float("nan")
+        equal, positive = self.comparisons.equal, np.maximum(y, 0.0)
+        return min(self.at(np.where(equal, sign * y, positive)) for sign in (1.0, -1.0))
+
+    def at(self, y: np.ndarray) -> float:
+        """D(y), for y >= 0 on the inequalities."""
+        mdp, comparisons = self.mdp, self.comparisons
+        most = 2 * self.r_max / (1 - mdp.gamma) if self.cap is None else self.cap
+        weights = np.where(comparisons.equal, 0.0, y)
+        per_state = np.bincount(comparisons.states, weights=weights, minlength=mdp.n_states)
+        slack = most * float(np.maximum(1 - per_state[self.objective_states], 0.0).sum())
+        return slack + self.r_max * float(np.maximum(np.abs(self.gradient(y)) - self.l1, 0.0).sum())
+
+    def gradient(self, y: np.ndarray) -> np.ndarray:
+        """c, the gradient of sum y margins with respect to R: (S,) or (S*A,), by one transposed solve."""
+        mdp, comparisons = self.mdp, self.comparisons
+        P_pi = mdp.P_pi(comparisons.distribution)
+        if self.on_states:
+            return solve_discounted(P_pi, mdp.gamma, comparisons.rows.T @ y, transpose=True)
         stacked = comparisons.states * mdp.n_actions + comparisons.actions
         on_V = np.bincount(comparisons.states, weights=y, minlength=mdp.n_states)
         on_V = on_V - mdp.gamma * (sp.csr_array(mdp.P[stacked]).T @ y)
         u = solve_discounted(P_pi, mdp.gamma, on_V, transpose=True)
-        c = mdp.mixing(comparisons.distribution).T @ u
-        c = c - np.bincount(stacked, weights=y, minlength=c.size)
-        c = np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, c)
-    return slack + r_max * float(np.maximum(np.abs(c) - l1, 0.0).sum())
-
-
-def summary(certificate: Certificate) -> Mapping[str, str]:
-    """The certificate in a few lines a person reads: label -> sentence."""
-    c = certificate
-    finite = c.margin[np.isfinite(c.margin)]
-    optimal = "yes" if c.expert_optimal else f"no, (4) is violated by {c.worst_violation:.2e}"
-    lines = {
-        "expert optimal under R": optimal,
-        "margins": f"{finite.min():.3g} to {finite.max():.3g} over {finite.size} states" if finite.size else "none",
-        "objective": f"{c.objective:.6g}, at most {c.duality_gap:.1e} below the optimum",
-    }
-    if c.inseparable.size:
-        lines["same successors"] = f"{c.inseparable.size} states have an action that no state reward tells from the expert's"
-    return lines
+        c = mdp.mixing(comparisons.distribution).T @ u - np.bincount(stacked, weights=y, minlength=mdp.P.shape[0])
+        return np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, c)

@@ -1,5 +1,17 @@
 """irl_gym: inverse reinforcement learning for Gymnasium.
 
+    tabulate(env, gamma=...)                  an environment as an exact table: mdp, reward, states, evidence
+    TabularMDP(P, gamma, d0)                  the same from arrays
+    value_iteration, policy_iteration         optimal policies of a table
+    FiniteLP().fit(mdp, expert)               a reward under which the expert is optimal, with a Certificate
+    worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns
+    LearnedReward(env, reward)                the environment, paying the learned reward
+    TabularEnv, TabularVecEnv                 a table as an environment, or as thousands of copies for Stable-Baselines3
+    SB3("PPO").plan(env, gamma=...)           an agent trained on it; ValueIteration().plan(...) plans exactly
+    collect, write_minari, read_minari        demonstrations
+    recover_and_retrain(Experiment(...), out) all of it in one call
+
+Each name's own module says more: `help(irl_gym.learners.finite)` for the linear programs. Errors derive from IrlGymError.
 The names below are imported when first used; `import irl_gym` itself loads no torch, cvxpy, minari or matplotlib.
 """
 

@@ -24,6 +24,6 @@ from .shaping import PositiveScaling as PositiveScaling
 from .shaping import PotentialShaping as PotentialShaping
 from .tabular_env import TabularEnv as TabularEnv
 from .tabular_vec_env import TabularVecEnv as TabularVecEnv
-from .tabulate import Tabulation as Tabulation
 from .tabulate import tabulate as tabulate
+from .tabulation import Tabulation as Tabulation
 from .wrappers import LearnedReward as LearnedReward

@@ -16,12 +16,12 @@ import scipy.sparse as sp
 
 from irl_gym._typing import Indices, Vector
 from irl_gym.comparisons import Comparisons, compare
-from irl_gym.dynamic_programming import solve_discounted
+from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
-from irl_gym.rewards import TabularReward
+from irl_gym.rewards import TabularReward, as_reward
 
-OPTIMAL_WITHIN = 1e-7
-"""A margin above minus this, relative to max |R| / (1 - gamma), counts as non-negative."""
+OPTIMAL_WITHIN = 1e-8
+"""What a solver's feasibility leaves, relative to max |R|; a margin below it is none, and a violation below it is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,10 @@ class Certificate:
     """The l1 above which R = 0 is optimal; None when not computed."""
     margin_cap: float | None
     """The cap tau on margins; None in Ng & Russell's own LP."""
+    l1_norm: float
+    """||R||_1."""
+    least_l1_norm: float
+    """No reward with all margins at the cap has a smaller ||R||_1; NaN when that was not asked."""
     constant: bool
     """Does R have the same value everywhere, and so say nothing?"""
     zero: bool
@@ -51,7 +55,7 @@ class Certificate:
     unconstrained: Indices
     """Reachable states, not terminal, in which (4) has no row at all or only trivial ones."""
     inseparable: Indices
-    """Reachable states where a reward on states leaves the expert tied with an action of equal successors."""
+    """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
     marginless: Indices
     """Reachable states with rows but without a positive margin under R."""
 
@@ -75,6 +79,9 @@ class Certificate:
             f"margins                  {span}",
             f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
         ]
+        if np.isfinite(self.least_l1_norm):
+            above = max(self.l1_norm - self.least_l1_norm, 0.0)
+            lines.append(f"||R||_1                  {self.l1_norm:.6g}, at most {above:.1e} above the least with these margins")
         if self.degenerate:
             lines.append(f"degenerate               R is {'zero' if self.zero else 'constant'}")
         if self.inseparable.size:
@@ -102,13 +109,18 @@ def _comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
     return ~comparisons.equal & ~comparisons.trivial if reward.on_states else ~comparisons.equal
 
 
-def row_margins(mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
-    """(n,) the margin of each row of (4) under a reward: Q(s, pi) - Q(s, a), for rewards on states as in (4)."""
-    P_pi = mdp.P_pi(comparisons.distribution)
+def row_margins(
+    mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, discounted: Discounted | None = None
+) -> np.ndarray:
+    """(n,) the margin of each row of (4) under a reward: Q(s, pi) - Q(s, a), for rewards on states as in (4).
+
+    `discounted` is I - gamma P_pi where it was factorised before.
+    """
+    discounted = discounted or Discounted(mdp.P_pi(comparisons.distribution), mdp.gamma)
     if reward.on_states:
-        return comparisons.rows @ solve_discounted(P_pi, mdp.gamma, reward.values)
+        return comparisons.rows @ discounted.solve(reward.values)
     R = reward.expected(mdp)
-    V = solve_discounted(P_pi, mdp.gamma, mdp.mixing(comparisons.distribution) @ R.ravel())
+    V = discounted.solve(mdp.mixing(comparisons.distribution) @ R.ravel())
     stacked = comparisons.states * mdp.n_actions + comparisons.actions
     return V[comparisons.states] - R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ V)
 
@@ -123,7 +135,7 @@ def least_per_state(values: np.ndarray, states: np.ndarray, n_states: int) -> Ve
 def certify(
     mdp: TabularMDP,
     expert: Any,
-    reward: TabularReward,
+    reward: TabularReward | np.ndarray,
     *,
     r_max: float = 1.0,
     l1: float = 0.0,
@@ -131,6 +143,7 @@ def certify(
     margin_cap: float | None = None,
     counted: Indices | None = None,
     y: np.ndarray | None = None,
+    y_l1: np.ndarray | None = None,
 ) -> Certificate:
     """Recompute what a reward proves about an expert.
 
@@ -145,20 +158,24 @@ def certify(
         counted: states whose margins are in the objective; None for all with a row.
         y: (n,) duals of the rows of (4) among the reachable states, in the order of `comparisons.compare`; any values give a
             valid bound.
+        y_l1: (n,) duals of the program that makes ||R||_1 least with all margins at the cap.
 
     Raises:
         InvalidPolicy: an expert of the wrong shape or content.
         InvalidReward: a reward of the wrong shape.
     """
+    reward = as_reward(reward)
     reward.expected(mdp)  # checks the shape
     rows = np.flatnonzero(mdp.reachable)
     part = mdp.restrict(rows)
-    comparisons = compare(part, _restricted(mdp, expert)[rows])
+    mdp.mixing(expert)  # checks shape and content for all states
+    comparisons = compare(part, np.asarray(expert)[rows])
+    discounted = Discounted(part.P_pi(comparisons.distribution), part.gamma)
     R = TabularReward(reward.values[rows])
-    values = row_margins(part, comparisons, R)
+    values = row_margins(part, comparisons, R, discounted)
     usable = _comparable(comparisons, R)
     least = least_per_state(values[usable], comparisons.states[usable], part.n_states)
-    rounding = (OPTIMAL_WITHIN * float(np.abs(R.values).max()) + 1e-13 * r_max) / (1 - mdp.gamma)
+    rounding = float(np.abs(R.values).max()) * (OPTIMAL_WITHIN + 1e-12 / (1 - mdp.gamma))
     if y is not None:  # a trivial row bounds no margin, so its dual may not tighten D(y)
         y = np.where(usable | comparisons.equal, y, 0.0)
     violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))
@@ -166,30 +183,29 @@ def certify(
     objective_states = _objective_states(comparisons, usable, margin_cap, counted, rows)
     margins = least[objective_states]
     total = float(np.minimum(margins, np.inf if margin_cap is None else margin_cap).sum())
+    dual = _Dual(part, comparisons, discounted, R.on_states, objective_states, r_max, l1, margin_cap)
+    norm = float(np.abs(R.values).sum())
     paid = R.values if R.on_states else R.values[~part.terminal]
-    tied = comparisons.states[comparisons.trivial & ~comparisons.equal]
+    tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
     margin = np.full(mdp.n_states, np.nan)
     margin[rows] = least
     return Certificate(
         expert_optimal=bool(worst <= rounding),
         worst_violation=worst,
         margin=margin,
-        objective=total - l1 * float(np.abs(R.values).sum()),
-        dual_bound=_Dual(part, comparisons, R.on_states, objective_states, r_max, l1, margin_cap).bound(y),
+        objective=total - l1 * norm,
+        dual_bound=dual.bound(y),
         l1=float(l1),
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if margin_cap is None else float(margin_cap),
+        l1_norm=norm,
+        least_l1_norm=dual.least_l1_norm(y_l1),
         constant=bool(np.ptp(paid) <= 1e-9 * r_max) if paid.size else True,
         zero=bool(np.abs(paid).max(initial=0.0) <= 1e-9 * r_max),
         unconstrained=rows[np.isnan(least) & ~part.terminal],
         inseparable=rows[np.unique(tied)],
         marginless=rows[least <= rounding],
     )
-
-
-def _restricted(mdp: TabularMDP, expert: Any) -> np.ndarray:
-    mdp.mixing(expert)  # checks shape and content for all states
-    return np.asarray(expert)
 
 
 def _objective_states(
@@ -210,6 +226,7 @@ class _Dual:
 
     mdp: TabularMDP
     comparisons: Comparisons
+    discounted: Discounted
     on_states: bool
     objective_states: np.ndarray
     r_max: float
@@ -221,7 +238,8 @@ class _Dual:
         if y is None:
             return float("nan")
         equal, positive = self.comparisons.equal, np.maximum(y, 0.0)
-        return min(self.at(np.where(equal, sign * y, positive)) for sign in (1.0, -1.0))
+        signs = (1.0, -1.0) if equal.any() else (1.0,)
+        return min(self.at(np.where(equal, sign * y, positive)) for sign in signs)
 
     def at(self, y: np.ndarray) -> float:
         """D(y), for y >= 0 on the inequalities."""
@@ -232,15 +250,26 @@ class _Dual:
         slack = most * float(np.maximum(1 - per_state[self.objective_states], 0.0).sum())
         return slack + self.r_max * float(np.maximum(np.abs(self.gradient(y)) - self.l1, 0.0).sum())
 
+    def least_l1_norm(self, y: np.ndarray | None) -> float:
+        """Lagrange's bound below every ||R||_1 with all margins at the cap: cap sum(y) - R_max sum_i (|c_i| - 1)+."""
+        if y is None or self.cap is None:
+            return float("nan")
+        counted = np.isin(self.comparisons.states, self.objective_states) & ~self.comparisons.equal
+        bounds = []
+        for sign in (1.0, -1.0):
+            signed = np.where(self.comparisons.equal, sign * y, np.maximum(y, 0.0))
+            beyond = np.maximum(np.abs(self.gradient(signed)) - 1, 0.0).sum()
+            bounds.append(self.cap * float(signed[counted].sum()) - self.r_max * float(beyond))
+        return max(bounds)
+
     def gradient(self, y: np.ndarray) -> np.ndarray:
         """c, the gradient of sum y margins with respect to R: (S,) or (S*A,), by one transposed solve."""
         mdp, comparisons = self.mdp, self.comparisons
-        P_pi = mdp.P_pi(comparisons.distribution)
         if self.on_states:
-            return solve_discounted(P_pi, mdp.gamma, comparisons.rows.T @ y, transpose=True)
+            return self.discounted.solve_transposed(comparisons.rows.T @ y)
         stacked = comparisons.states * mdp.n_actions + comparisons.actions
         on_V = np.bincount(comparisons.states, weights=y, minlength=mdp.n_states)
         on_V = on_V - mdp.gamma * (sp.csr_array(mdp.P[stacked]).T @ y)
-        u = solve_discounted(P_pi, mdp.gamma, on_V, transpose=True)
+        u = self.discounted.solve_transposed(on_V)
         c = mdp.mixing(comparisons.distribution).T @ u - np.bincount(stacked, weights=y, minlength=mdp.P.shape[0])
         return np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, c)

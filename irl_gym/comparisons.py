@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym._typing import ActionSets, Matrix, Sparse
+from irl_gym._typing import Matrix, Sparse
 from irl_gym.mdp import TransitionTable
 from irl_gym.policies import as_distribution
 
@@ -41,11 +41,6 @@ class Comparisons:
         """(n,) the two actions have the same successors: no reward on states can tell them apart."""
         difference = abs(self.rows)
         return np.asarray(difference.max(axis=1).todense()).ravel() <= SAME_SUCCESSORS
-
-    @property
-    def expert_set(self) -> ActionSets:
-        """(S, A) the actions that the expert takes."""
-        return self.distribution > 0
 
 
 def compare(table: TransitionTable, expert: Any) -> Comparisons:

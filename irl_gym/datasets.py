@@ -55,6 +55,7 @@ def write_minari(
     author: str = "irl_gym",
     author_email: str = "none given",
     description: str = "Demonstrations recorded with irl_gym.",
+    code_permalink: str | None = None,
     random_return: float | None = None,
     expert_return: float | None = None,
 ) -> minari.MinariDataset:
@@ -69,6 +70,7 @@ def write_minari(
         author: who made it.
         author_email: how to reach them.
         description: a sentence.
+        code_permalink: where the code is that recorded them.
         random_return: mean return of a random policy (Minari's `ref_min_score`).
         expert_return: mean return of the expert (`ref_max_score`).
 
@@ -80,7 +82,7 @@ def write_minari(
     try:
         namespace, *_ = parse_dataset_id(dataset_id)
     except (ValueError, TypeError) as error:
-        raise InvalidParameter(f"dataset id {dataset_id!r}: expected namespace/name-v0, the version included.") from error
+        raise InvalidParameter(f"dataset id {dataset_id!r} is malformed ({error}): expected namespace/name-v0.") from error
     with minari_root(root) as base:
         final = base / dataset_id
         if final.exists():
@@ -99,7 +101,7 @@ def write_minari(
                 written = minari.create_dataset_from_buffers(
                     dataset_id, buffers, env=env, eval_env=env if env.spec is not None else None,
                     algorithm_name=algorithm, author=author, author_email=author_email,
-                    code_permalink="scripts/recover_and_retrain.py of irl_gym", description=description,
+                    code_permalink=code_permalink, description=description, num_episodes_average_score=len(buffers),
                     ref_min_score=random_return, ref_max_score=expert_return, data_format="hdf5", jpeg_encoding=False,
                 )  # fmt: skip
                 del written  # its storage is about to move
@@ -162,10 +164,11 @@ def read_minari(
             f"{_identity(env.spec)}. Make the environment with `dataset.recover_environment()`."
         )
     first = int(actions.start)
-    for episode in dataset.iterate_episodes():
+    described = dataset.storage.get_episode_metadata(dataset.episode_indices)
+    for episode, metadata in zip(dataset.iterate_episodes(), described, strict=True):
         yield Episode(
             episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, np.asarray(episode.rewards, float),
-            bool(episode.terminations[-1]), bool(episode.truncations[-1]),
+            bool(episode.terminations[-1]), bool(episode.truncations[-1]), metadata.get("seed"),
         )  # fmt: skip
 
 

@@ -12,8 +12,9 @@ import gymnasium as gym
 import numpy as np
 
 from irl_gym._typing import Matrix, StateMask
+from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.mdp import TransitionTable
+from irl_gym.mdp import TransitionTable, check_discount
 from irl_gym.policies import Policy, as_distribution
 from irl_gym.sampling import Successors
 from irl_gym.states import StateIndex
@@ -41,7 +42,13 @@ class Episode:
     """Given to `reset`; None when the episode was drawn from a table."""
 
     def __post_init__(self) -> None:
-        steps = len(self.actions)
+        actions = np.asarray(self.actions)
+        if actions.ndim != 1 or (actions.size and actions.dtype.kind not in "iu"):
+            raise InvalidDemonstrations(
+                f"an episode's actions have shape {actions.shape} and dtype {actions.dtype}: expected (T,) integers."
+            )
+        object.__setattr__(self, "actions", actions)
+        steps = len(actions)
         if steps == 0 or len(self.rewards) != steps:
             raise InvalidDemonstrations(
                 f"an episode has {steps} actions and {len(self.rewards)} rewards: expected as many rewards as actions, and "
@@ -111,6 +118,12 @@ def collect(
         InvalidParameter: fewer than 1 episodes or steps.
     """
     _check_count(n_episodes, max_episode_steps)
+    return _stepped(env, policy, n_episodes, seed, deterministic, max_episode_steps)
+
+
+def _stepped(
+    env: gym.Env, policy: Policy, n_episodes: int, seed: int, deterministic: bool, max_episode_steps: int | None
+) -> Iterator[Episode]:
     first_action = int(getattr(env.action_space, "start", 0))
     for episode_seed in range(seed, seed + n_episodes):
         observation, _ = env.reset(seed=episode_seed)
@@ -130,8 +143,8 @@ def collect(
 
 def _check_count(n_episodes: int, max_episode_steps: int | None) -> None:
     for name, value in (("n_episodes", n_episodes), ("max_episode_steps", max_episode_steps)):
-        if value is not None and value < 1:
-            raise InvalidParameter(f"{name} is {value}: expected at least 1.")
+        if value is not None:
+            checked_number(name, value, "a whole number of at least 1", least=1)
 
 
 def collect_from_table(
@@ -148,7 +161,7 @@ def collect_from_table(
 
     Args:
         table: P and d0.
-        entry_rewards: (nnz,) reward of each transition, in the order of `table.P.data`; see `Tabulation.entry_rewards`.
+        entry_rewards: (nnz,) reward of each transition, in the order of `table.P.data`; see `Tabulation.payments`.
         states: turns rows into the environment's observations.
         policy: (S,) actions, (S, A) probabilities or (S, A) set.
         n_episodes: N, at least 1.
@@ -160,16 +173,23 @@ def collect_from_table(
         InvalidPolicy: wrong shape or content.
     """
     _check_count(n_episodes, max_episode_steps)
+    distribution = as_distribution(policy, table.n_states, table.n_actions)
+    return _drawn(table, entry_rewards, states, distribution, n_episodes, seed, max_episode_steps)
+
+
+def _drawn(
+    table: TransitionTable, paid: np.ndarray, states: StateIndex, policy: Matrix, n_episodes: int, seed: int, most: int
+) -> Iterator[Episode]:
     rng = np.random.default_rng(seed)
-    cumulated = as_distribution(policy, table.n_states, table.n_actions).cumsum(axis=1)
+    cumulated = policy.cumsum(axis=1)
     successors = Successors(table)
-    rows = np.full((n_episodes, max_episode_steps + 1), -1, dtype=np.int64)
-    actions = np.zeros((n_episodes, max_episode_steps), dtype=np.int64)
-    rewards = np.zeros((n_episodes, max_episode_steps))
+    rows = np.full((n_episodes, most + 1), -1, dtype=np.int64)
+    actions = np.zeros((n_episodes, most), dtype=np.int64)
+    rewards = np.zeros((n_episodes, most))
     length = np.zeros(n_episodes, dtype=np.int64)
     rows[:, 0] = successors.start(n_episodes, rng)
     going = np.arange(n_episodes)
-    for t in range(max_episode_steps):
+    for t in range(most):
         if not going.size:
             break
         here = rows[going, t]
@@ -177,7 +197,7 @@ def collect_from_table(
         actions[going, t] = np.minimum((draws >= cumulated[here]).sum(axis=1), table.n_actions - 1)
         entries = successors.entries(here, actions[going, t], rng)
         rows[going, t + 1] = table.P.indices[entries]
-        rewards[going, t] = entry_rewards[entries]
+        rewards[going, t] = paid[entries]
         length[going] = t + 1
         going = going[~table.terminal[rows[going, t + 1]]]
     for i, n in enumerate(length.tolist()):
@@ -236,8 +256,11 @@ def feature_expectations(episodes: Iterable[Episode], features: np.ndarray, stat
 
     Raises:
         InvalidDemonstrations: no episode.
+        InvalidDiscount: gamma outside (0, 1).
         InvalidParameter: features of the wrong shape.
     """
+    check_discount(gamma)
+    features = float_array("features", features, "(S, K) numbers", InvalidParameter)
     if features.ndim != 2 or features.shape[0] != states.n_states:
         raise InvalidParameter(f"the features have shape {features.shape}: expected ({states.n_states}, K).")
     total, number = np.zeros(features.shape[1]), 0

@@ -17,6 +17,7 @@ IrlGymError
 ├── SolverError
 │   ├── SolverTimeout          the time limit was reached before an answer
 │   └── SolverFailed           no solver gave an answer
+│       └── SolverInfeasible   the answer is that the constraints contradict each other
 ├── DatasetMismatch            a dataset recorded in another environment
 ├── DatasetExists              a Minari id that is taken
 └── RunConflict                a run folder that holds another run
@@ -91,6 +92,10 @@ class SolverTimeout(SolverError):
 
 class SolverFailed(SolverError):
     """No solver gave an answer."""
+
+
+class SolverInfeasible(SolverFailed):
+    """The answer is that the constraints contradict each other."""
 
 
 class DatasetMismatch(IrlGymError):

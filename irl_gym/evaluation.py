@@ -4,6 +4,7 @@ No wall time is in it, so that the same seed gives the same bytes; seconds are i
 """
 
 import csv
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from irl_gym.loop import Loop
 
 GOOD = 0.9
-"""Score whose first crossing on the learning curve is reported."""
+"""Score that the learning curve is reported to reach for good."""
 
 
 def evaluate(loop: "Loop") -> dict[str, Any]:
@@ -38,7 +39,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         }
     worst = metrics.worst_tie(mdp, loop.learned, true)
     share = (expert - worst.value) / (expert - random) if expert != random else float("nan")
-    keys = ("l1", "lambda_0", "margin_cap", "duality_gap", "expert_optimal", "degenerate")
+    keys = ("l1", "lambda_0", "margin_cap", "duality_gap", "l1_norm", "least_l1_norm", "expert_optimal", "degenerate")
     reward = {key: loop.certificate[key] for key in keys}
     reward |= {
         "worst_tie_value": worst.value,
@@ -47,7 +48,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         "inseparable_states": len(loop.certificate["inseparable"]),
         "marginless_states": len(loop.certificate["marginless"]),
     }
-    crossing = _first_crossing(learning_curve(loop), random, expert)
+    crossing = settled_at(learning_curve(loop), random, expert)
     check = loop.table.evidence.check
     return {
         "policies": rows,
@@ -63,16 +64,24 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
 
 def learning_curve(loop: "Loop") -> np.ndarray:
     """(n, 2) environment steps and exact true value, as the agent trained."""
-    with (loop.folder.path / "learning_curve.csv").open(newline="") as file:
-        lines = list(csv.reader(file))[1:]
+    return loop.folder.load("learning_curve.csv", _read_curve)
+
+
+def _read_curve(path: Path) -> np.ndarray:
+    with path.open(newline="") as file:
+        heading, *lines = csv.reader(file)
+    if heading != ["environment_steps", "true_value"]:
+        raise ValueError(f"its columns are {heading}")
     return np.array(lines, dtype=np.float64).reshape(-1, 2)
 
 
-def _first_crossing(curve: np.ndarray, random: float, expert: float) -> int | None:
+def settled_at(curve: np.ndarray, random: float, expert: float) -> int | None:
+    """Environment steps after which the score on a learning curve (n, 2) stays at GOOD or above; None if it does not."""
     if expert == random or not len(curve):
         return None
-    good = np.flatnonzero((curve[:, 1] - random) / (expert - random) >= GOOD)
-    return int(curve[good[0], 0]) if good.size else None
+    bad = np.flatnonzero((curve[:, 1] - random) / (expert - random) < GOOD)
+    first = bad[-1] + 1 if bad.size else 0
+    return int(curve[first, 0]) if first < len(curve) else None
 
 
 def _plain(value: float) -> float | None:

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass
 from typing import Any
 
+from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Learner
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.mdp import check_discount
 from irl_gym.planners import FOR_ADVANTAGES, SB3, Planner, ValueIteration
 
 
@@ -18,14 +20,15 @@ class Experiment:
     """What one run of the loop does.
 
     Raises:
+        InvalidDiscount: gamma outside (0, 1).
         InvalidParameter: fewer than 1 episodes or copies.
     """
 
-    env_id: str = "FrozenLake-v1"
+    env_id: str
     """A registered environment; `module:id` for one of another package."""
-    gamma: float = 0.99
-    """Discount; the only default for it in the library, for the script's sake."""
-    env_kwargs: Mapping[str, Any] = field(default_factory=dict)
+    gamma: float
+    """Discount, between 0 and 1."""
+    env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Given to `gymnasium.make`."""
     expert: Planner = field(default_factory=ValueIteration)
     """Plans or learns under the true reward."""
@@ -45,9 +48,10 @@ class Experiment:
     """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
+        check_discount(self.gamma)
         for name in ("episodes", "num_envs", "eval_episodes"):
-            if getattr(self, name) < 1:
-                raise InvalidParameter(f"{name} is {getattr(self, name)}: expected at least 1.")
+            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1)
+        checked_number("seed", self.seed, "a whole number from 0 to 2^32 - 1, as Stable-Baselines3 takes", least=0, below=2**32)
 
     @property
     def name(self) -> str:

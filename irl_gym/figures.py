@@ -7,8 +7,8 @@ from irl_gym import plotting
 from irl_gym.dynamic_programming import evaluate_policy
 from irl_gym.evaluation import learning_curve
 from irl_gym.layouts import grid_layout
-from irl_gym.metrics import random_value
-from irl_gym.policies import as_distribution
+from irl_gym.metrics import optimal_actions, random_value
+from irl_gym.policies import as_distribution, support
 
 if TYPE_CHECKING:
     from irl_gym.loop import Loop
@@ -20,12 +20,12 @@ def draw(loop: "Loop", folder: Path) -> list[str]:
     layout = grid_layout(loop.env, mdp)
     values = [evaluate_policy(mdp, reward.expected(mdp), loop.expert_actions) for reward in (true, learned)]
     agent = as_distribution(loop.agent_actions, mdp.n_states, mdp.n_actions)
-    expert = as_distribution(loop.expert_actions, mdp.n_states, mdp.n_actions) > 0
+    expert = support(loop.expert_actions, mdp.n_states, mdp.n_actions)
     curve = learning_curve(loop)
     pictures = {
         "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp),
         "values.png": plotting.draw_values(layout, values[0], values[1], mdp),
-        "policies.png": plotting.draw_policies(layout, expert, agent, loop.optimal_set, mdp),
+        "policies.png": plotting.draw_policies(layout, expert, agent, optimal_actions(mdp, true), mdp),
         "learning_curve.png": plotting.draw_learning_curve(
             {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])},
             expert=loop.true_value(loop.expert_actions),

@@ -11,7 +11,6 @@ The true reward enters the table, the expert and the judging only; the learning 
 """
 
 import csv
-import json
 import os
 import re
 import time
@@ -30,12 +29,13 @@ from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
 from irl_gym.planners import Agent, Planner, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.policies import Policy, TabularPolicy, as_distribution, support
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RunFolder, write_json
+from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged
 from irl_gym.tabular_vec_env import TabularVecEnv
-from irl_gym.tabulate import Tabulation, make, tabulate
+from irl_gym.tabulate import make, tabulate
+from irl_gym.tabulation import Tabulation
 
 STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 """After the table, which is made anew at each start: it is cheap and exact."""
@@ -88,17 +88,17 @@ class Loop:
     @cached_property
     def expert_actions(self) -> Actions:
         """(S,) the expert."""
-        return _load_actions(self.folder.path / "expert.npz")
+        return self.folder.load("expert.npz", _load_actions)
 
     @cached_property
     def agent_actions(self) -> Actions:
         """(S,) the retrained agent, deterministic."""
-        return _load_actions(self.folder.path / "agent_policy.npz")
+        return self.folder.load("agent_policy.npz", _load_actions)
 
     @cached_property
     def learned(self) -> TabularReward:
         """The recovered reward."""
-        return TabularReward.load(self.folder.path / "reward.npz")
+        return self.folder.load("reward.npz", TabularReward.load)
 
     @cached_property
     def optimal_set(self) -> ActionSets:
@@ -106,9 +106,9 @@ class Loop:
         mdp, reward = self.table.mdp, self.table.reward
         best = policy_iteration(mdp, reward.values)
         value = self.true_value(self.expert_actions)
-        if value >= float(mdp.d0 @ best.V) - metrics.TIE_TOLERANCE:
+        if value >= float(mdp.d0 @ best.V) - metrics.TIE_TOLERANCE * float(np.abs(reward.values).max()):
             return metrics.optimal_actions(mdp, reward)
-        return as_distribution(self.expert_actions, mdp.n_states, mdp.n_actions) > 0
+        return support(self.expert_actions, mdp.n_states, mdp.n_actions)
 
     def _train(self, planner: Planner, reward: TabularReward, progress: Callable[[int, Policy], None] | None) -> Policy:
         env = TabularVecEnv(
@@ -131,9 +131,9 @@ class Loop:
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a tabular policy in the environment: from the table where it holds every reward, else by stepping."""
         table = self.table
-        if table.entry_rewards is not None:
+        if table.payments.entries is not None:
             drawn = collect_from_table(
-                table.mdp, table.entry_rewards, table.states, policy, n, seed=seed, max_episode_steps=self.limit
+                table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=self.limit
             )
             return list(drawn)
         distribution = as_distribution(policy, table.mdp.n_states, table.mdp.n_actions)
@@ -156,10 +156,16 @@ class Loop:
         write_minari(
             recorded, dataset_id, self.env, root=root, algorithm=type(experiment.expert).__name__,
             description=f"Expert demonstrations of {experiment.env_id}, gamma {experiment.gamma}, seed {experiment.seed}.",
+            code_permalink="scripts/recover_and_retrain.py of irl_gym",
             random_return=float(np.mean([episode.total_reward for episode in chance])),
             expert_return=float(np.mean([episode.total_reward for episode in recorded])),
         )  # fmt: skip
-        return {"dataset_id": dataset_id, "episodes": len(recorded), "environment_steps": sum(map(len, recorded))}
+        return {
+            "dataset_id": dataset_id,
+            "episodes": len(recorded),
+            "environment_steps": sum(map(len, recorded)),
+            "seed": experiment.seed,
+        }
 
     def _make_reward(self, folder: Path) -> dict[str, Any]:
         result = self.experiment.learner.fit(self.table.mdp, self.expert_actions)
@@ -177,7 +183,7 @@ class Loop:
     @cached_property
     def certificate(self) -> dict[str, Any]:
         """The content of certificate.json."""
-        return json.loads((self.folder.path / "certificate.json").read_text())
+        return self.folder.load("certificate.json", read_json)
 
     def _make_agent(self, folder: Path) -> dict[str, Any]:
         planner = self.experiment.retrain

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import breadth_first_order
 
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
+from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidDiscount, InvalidMDP
 from irl_gym.policies import as_distribution
 
@@ -36,7 +37,7 @@ class TransitionTable:
 
     def __init__(self, P: Any, d0: Any):
         self.P: Sparse = _frozen_csr(P)
-        self.d0: Vector = _frozen(np.array(d0, dtype=np.float64))
+        self.d0: Vector = _frozen(float_array("d0", d0, "(S,) probabilities", InvalidMDP))
         self.n_states: int = self.P.shape[1]
         _check_start(self.d0, self.n_states)
         if self.P.shape[0] == 0 or self.P.shape[0] % self.n_states:
@@ -55,7 +56,7 @@ class TransitionTable:
     @classmethod
     def from_dense(cls, P: Any, *args: Any, **kwargs: Any):
         """Make a table from a dense array of shape (S, A, S); the other arguments are the constructor's."""
-        array = np.asarray(P, dtype=np.float64)
+        array = float_array("P", P, "(S, A, S) probabilities", InvalidMDP)
         if array.ndim != 3 or array.shape[0] != array.shape[2]:
             raise InvalidMDP(f"P has shape {array.shape}: expected (S, A, S).")
         return cls(array.reshape(-1, array.shape[2]), *args, **kwargs)
@@ -153,9 +154,8 @@ def check_discount(gamma: float) -> float:
     Raises:
         InvalidDiscount: anything else.
     """
-    if not 0 < gamma < 1:
-        raise InvalidDiscount(f"gamma is {gamma}: expected a discount strictly between 0 and 1, such as 0.99.")
-    return float(gamma)
+    expected = "a discount strictly between 0 and 1, such as 0.99"
+    return checked_number("gamma", gamma, expected, above=0, below=1, error=InvalidDiscount)
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:
@@ -165,7 +165,7 @@ def _frozen(array: np.ndarray) -> np.ndarray:
 
 def _frozen_csr(P: Any) -> Sparse:
     if not sp.issparse(P):
-        P = np.asarray(P, dtype=np.float64)
+        P = float_array("P", P, "(S*A, S) probabilities", InvalidMDP)
         if P.ndim != 2:
             raise InvalidMDP(f"P has shape {P.shape}: expected (S*A, S). For an (S, A, S) array use `from_dense`.")
     csr: Any = sp.csr_array(P, dtype=np.float64, copy=True)
@@ -208,3 +208,14 @@ def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
             "is zero, elsewhere none. Give an action that is not available the rows of one that is."
         )
     return empty.all(axis=1)
+
+
+def entry_rows(P: Sparse) -> np.ndarray:
+    """(nnz,) the row of each entry of P, in the order of P.data."""
+    return np.repeat(np.arange(P.shape[0]), np.diff(P.indptr))
+
+
+def entry_positions(P: Sparse, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """(N,) positions in P.data of the entries (row, column), all of which P has."""
+    stored = entry_rows(P) * P.shape[1] + P.indices  # increasing, since a table's P is canonical
+    return np.searchsorted(stored, rows * P.shape[1] + columns)

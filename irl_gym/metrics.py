@@ -13,10 +13,10 @@ from irl_gym._typing import ActionSets, Matrix
 from irl_gym.dynamic_programming import evaluate_policy, policy_iteration, tied
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
-from irl_gym.rewards import TabularReward
+from irl_gym.rewards import TabularReward, as_reward
 
 TIE_TOLERANCE = 1e-6
-"""Actions with Q within this of the best are greedy. In units of the learned reward's values."""
+"""Actions with Q within this of the best are greedy, in units of the reward's largest |R|."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,26 +31,29 @@ class WorstTie:
     """(S, A) the greedy actions."""
 
 
-def policy_value(mdp: TabularMDP, reward: TabularReward, policy: Any) -> float:
+def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any) -> float:
     """Exact discounted value of a policy from d0: d0 . (I - gamma P_pi)^-1 R_pi."""
-    return float(mdp.d0 @ evaluate_policy(mdp, reward.expected(mdp), policy))
+    return float(mdp.d0 @ evaluate_policy(mdp, as_reward(reward), policy))
 
 
-def random_value(mdp: TabularMDP, reward: TabularReward) -> float:
+def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:
     """Exact discounted value of uniformly random actions from d0."""
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
     return policy_value(mdp, reward, uniform)
 
 
-def optimal_actions(mdp: TabularMDP, reward: TabularReward, *, tolerance: float = TIE_TOLERANCE) -> ActionSets:
-    """(S, A) the actions that are optimal, to a tolerance in units of value."""
-    return tied(policy_iteration(mdp, reward.expected(mdp)).Q, tolerance)
+def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE) -> ActionSets:
+    """(S, A) the actions that are optimal, to a tolerance in units of max |R|."""
+    reward = as_reward(reward)
+    return tied(policy_iteration(mdp, reward).Q, tolerance * float(np.abs(reward.values).max()))
 
 
-def worst_tie(mdp: TabularMDP, learned: TabularReward, true: TabularReward, *, tolerance: float = TIE_TOLERANCE) -> WorstTie:
+def worst_tie(
+    mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
+) -> WorstTie:
     """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions."""
     ties = optimal_actions(mdp, learned, tolerance=tolerance)
-    worst = policy_iteration(mdp, -true.expected(mdp), allowed=ties)
+    worst = policy_iteration(mdp, -as_reward(true).expected(mdp), allowed=ties)
     return WorstTie(worst.policy, -float(mdp.d0 @ worst.V), ties)
 
 

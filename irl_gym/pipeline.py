@@ -1,6 +1,5 @@
 """The closed loop in one call: environment -> expert -> Minari -> LP-IRL -> reward -> SB3 -> how good it is."""
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from typing import Any
 
 from irl_gym.experiment import Experiment
 from irl_gym.loop import STAGES, Loop, OnProgress
+from irl_gym.run_folder import read_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,5 +44,5 @@ def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progr
     """
     loop = Loop(experiment, out, on_progress)
     stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-    content = json.loads((loop.folder.path / "metrics.json").read_text())
+    content = loop.folder.load("metrics.json", read_json)
     return Report(loop.folder.path, content, loop.certificate, stages)

@@ -6,8 +6,9 @@ policy with SB3's `predict`.
 
 import contextlib
 import copy
-import math
 import os
+import re
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,9 +24,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym._typing import Actions
+from irl_gym.checks import checked_number
 from irl_gym.dynamic_programming import value_iteration
 from irl_gym.errors import InvalidParameter
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.states import StateIndex
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -71,8 +73,8 @@ class Planner(Protocol):
 class ValueIteration:
     """Exact planning on the table of the environment."""
 
-    tolerance: float = 1e-8
-    """Bound on the error of the values, in units of value."""
+    tolerance: float | None = None
+    """Bound on the error of the values, in units of value; None for 1e-10 of max |R| / (1 - gamma)."""
     sweeps: int = 50
     """Evaluation sweeps after each improvement; 0 for plain value iteration."""
     preference: Sequence[int] | None = None
@@ -85,14 +87,14 @@ class ValueIteration:
             NotTabular, NotDiscrete: no table can be made.
         """
         if isinstance(env, TabularVecEnv):
-            table, R = env.table, env.reward.expected(env.table)
+            table, R = env.table, env.reward
             states = env.states or StateIndex(spaces.Discrete(table.n_states))
             mdp = TabularMDP(table.P, gamma, table.d0)
         elif isinstance(env, VecEnv):
             raise InvalidParameter(f"{type(env).__name__} has no table: expected a Gymnasium environment or TabularVecEnv.")
         else:
             found = tabulate(env, gamma=gamma, check_steps=0)
-            mdp, R, states = found.mdp, found.reward.values, found.states
+            mdp, R, states = found.mdp, found.reward, found.states
         solution = value_iteration(mdp, R, tolerance=self.tolerance, sweeps=self.sweeps, preference=self.preference)
         return TabularPolicy(as_distribution(solution.policy, mdp.n_states, mdp.n_actions), states, seed)
 
@@ -123,9 +125,15 @@ def load_agent(path: str | os.PathLike, algorithm: Algorithm) -> Agent:
 
     Raises:
         FileNotFoundError: no such file.
-        InvalidParameter: an unknown algorithm.
+        InvalidParameter: an unknown algorithm, or a file that holds none of its agents.
     """
-    return Agent(_algorithm(algorithm).load(Path(path), device="cpu"))
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist: expected an agent's zip, as SB3 writes it.")
+    try:
+        return Agent(_algorithm(algorithm).load(path, device="cpu"))
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, RuntimeError) as error:
+        raise InvalidParameter(f"{path} holds no {algorithm} agent ({error}): expected SB3's zip of one.") from error
 
 
 def _algorithm(name: str) -> type[BaseAlgorithm]:
@@ -146,15 +154,15 @@ class SB3:
     """"PPO", "DQN" or "A2C"."""
     total_timesteps: int = 400_000
     """Environment steps, all copies together."""
-    hyperparameters: Mapping[str, Any] = field(default_factory=dict)
+    hyperparameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Of SB3's constructor; they override `DEFAULTS`."""
     threads: int = 1
     """Torch threads while training. Networks this small are slower on more."""
 
     def __post_init__(self) -> None:
         _algorithm(self.algorithm)
-        if self.total_timesteps < 1:
-            raise InvalidParameter(f"total_timesteps is {self.total_timesteps}: expected at least 1.")
+        for name in ("total_timesteps", "threads"):
+            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1)
 
     def plan(
         self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0
@@ -170,13 +178,24 @@ class SB3:
         """
         settings = self._settings(env)
         with _torch_threads(self.threads):
-            model = _algorithm(self.algorithm)("MlpPolicy", env, gamma=gamma, seed=seed, device="cpu", **settings)  # pyright: ignore
+            model = self._model(env, gamma=check_discount(gamma), seed=seed, device="cpu", **settings)
             agent = Agent(model)
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
             model.learn(self.total_timesteps, callback=callback)
         if progress:
             progress(model.num_timesteps, agent)
         return agent
+
+    def _model(self, env: gym.Env | VecEnv, **settings: Any) -> BaseAlgorithm:
+        try:
+            return _algorithm(self.algorithm)("MlpPolicy", env, **settings)
+        except TypeError as error:
+            unexpected = re.search(r"unexpected keyword argument '(\w+)'", str(error))
+            if unexpected is None:
+                raise
+            raise InvalidParameter(
+                f"{self.algorithm} takes no hyper-parameter {unexpected[1]!r}: expected those of SB3's constructor."
+            ) from error
 
     def _settings(self, env: gym.Env | VecEnv) -> dict[str, Any]:
         """What SB3's constructor is given; a copy, since SB3 writes into `policy_kwargs`."""
@@ -185,8 +204,14 @@ class SB3:
         if discrete and self.algorithm == "PPO":  # rollouts of 2048 steps, whatever the number of copies
             copies = getattr(env, "num_envs", 1)
             settings.setdefault("n_steps", max(8, 2048 // copies))
-            settings.setdefault("batch_size", math.gcd(settings["n_steps"] * copies, 1024))
+            settings.setdefault("batch_size", _batch_size(settings["n_steps"] * copies))
         return settings
+
+
+def _batch_size(rollout: int) -> int:
+    """Half a rollout or less, about 1024, without a rest; all of it where it has no such divisor."""
+    divisors = [d for d in range(256, min(rollout, 1024) + 1) if rollout % d == 0]
+    return max(divisors, default=rollout)
 
 
 class _Report(BaseCallback):

@@ -36,7 +36,10 @@ def as_distribution(policy: Any, n_states: int, n_actions: int) -> Matrix:
     Raises:
         InvalidPolicy: wrong shape, action out of range, empty set, probabilities negative, NaN or not summing to 1.
     """
-    array = np.asarray(policy)
+    try:
+        array = np.asarray(policy)
+    except ValueError as error:
+        raise InvalidPolicy(f"policy cannot be read as an array ({error}): expected one entry for each state.") from error
     if array.shape == (n_states,) and array.dtype.kind in "iu":
         return _one_hot(array, n_actions)
     if array.shape != (n_states, n_actions):
@@ -80,7 +83,11 @@ def _checked_probabilities(array: np.ndarray) -> np.ndarray:
 
 
 def support(policy: Any, n_states: int, n_actions: int) -> ActionSets:
-    """The actions that a policy takes with positive probability: (S, A) booleans."""
+    """The actions that a policy takes with positive probability: (S, A) booleans.
+
+    Raises:
+        InvalidPolicy: wrong shape or content.
+    """
     return as_distribution(policy, n_states, n_actions) > 0
 
 
@@ -96,7 +103,12 @@ class TabularPolicy:
     """Of the generator that `predict(deterministic=False)` draws from."""
 
     def __post_init__(self) -> None:
-        checked = as_distribution(self.probabilities, self.states.n_states, np.shape(self.probabilities)[-1])
+        if np.ndim(self.probabilities) != 2:
+            raise InvalidPolicy(
+                f"probabilities have shape {np.shape(self.probabilities)}: expected (S, A). Turn (S,) actions into them with "
+                "`irl_gym.policies.as_distribution(actions, S, A)`."
+            )
+        checked = as_distribution(self.probabilities, self.states.n_states, np.shape(self.probabilities)[1])
         checked.setflags(write=False)
         object.__setattr__(self, "probabilities", checked)
         object.__setattr__(self, "_rng", np.random.default_rng(self.seed))

@@ -29,11 +29,11 @@ def _policies(report: Report) -> Table:
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
         score = "-" if row["score"] is None else f"{row['score']:.3f}"
-        interval = f"{row['mean_return']:.4g} ({row['return_low']:.4g} to {row['return_high']:.4g})"
+        interval = "{:.3f} ({:.3f} to {:.3f})".format(*(row[key] for key in ("mean_return", "return_low", "return_high")))
         table.add_row(name, f"{row['value']:.4f}", score, interval, f"{row['agreement']:.1%}")
     table.caption = (
         "value: exact, discounted, from the start. score: random = 0, expert = 1. mean return: undiscounted, sampled. "
-        "agreement: share of states with one of the expert's actions. retrained: on the recovered reward alone."
+        "agreement: share of states with one of the expert's actions."
     )
     table.caption_justify = "left"
     return table
@@ -53,12 +53,20 @@ def _reward(report: Report) -> Table:
     cap = reward["margin_cap"]
     table.add_row("margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}")
     gap = reward["duality_gap"]
-    table.add_row("short of the optimum by", "unknown" if gap is None else f"at most {max(gap, 0.0):.1e}")
+    table.add_row("margins short of the most by", "unknown" if gap is None else f"at most {max(gap, 0.0):.1e}")
+    if reward["least_l1_norm"] is not None:
+        above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
+        table.add_row("||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins")
     if reward["inseparable_states"]:
         table.add_row(
             "states it cannot settle",
             f"{reward['inseparable_states']}: there an action has the expert's successors. Try --reward-on state-action.",
         )
+    table.caption = (
+        "worst-tie regret: what the worst policy greedy under the reward loses. lambda: price of ||R||_1; above lambda_0 R is "
+        "0. margin: how much better the expert's action is than another."
+    )
+    table.caption_justify = "left"
     return table
 
 
@@ -73,6 +81,6 @@ def _stages(report: Report) -> Table:
         steps = f"{taken:,}" if taken else ""
         if name == "agent" and taken:
             crossing = training["steps_to_0.9"]
-            steps += " (never at score 0.9)" if crossing is None else f" (score 0.9 after {crossing:,})"
-        table.add_row(name, f"{record['seconds']:.1f}", steps)
+            steps += " (not at score 0.9 to stay)" if crossing is None else f" (score 0.9 or more after {crossing:,})"
+        table.add_row(name, f"{record['seconds']:.1f}{' (kept)' if record.get('kept') else ''}", steps)
     return table

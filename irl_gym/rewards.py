@@ -8,6 +8,7 @@ greedy for both, and a terminal goal is paid exactly once. A reward on steps (S,
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import Matrix
+from irl_gym.checks import float_array
 from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TransitionTable
 
@@ -45,7 +47,7 @@ class TabularReward:
     """Where it comes from; anything json can hold."""
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
+        values = float_array("the reward", self.values, "(S,) or (S, A) numbers", InvalidReward)
         if values.ndim not in (1, 2) or values.size == 0:
             raise InvalidReward(f"the reward has shape {values.shape}: expected (S,) or (S, A).")
         wrong = np.argwhere(~np.isfinite(values))
@@ -57,6 +59,10 @@ class TabularReward:
 
     def __reduce__(self) -> tuple:
         return type(self), (self.values, dict(self.note))
+
+    def __repr__(self) -> str:
+        kind = "on arrival" if self.on_states else "for the step"
+        return f"TabularReward({self.values.shape} paid {kind}, {self.values.min():.3g} to {self.values.max():.3g})"
 
     @property
     def n_states(self) -> int:
@@ -91,7 +97,7 @@ class TabularReward:
         """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
         path = Path(path)
         beside = path.with_name(f".{path.name}.tmp.npz")
-        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True)
+        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True, default=_plain)
         np.savez(beside, values=self.values, header=np.array(header))
         beside.replace(path)
 
@@ -106,8 +112,33 @@ class TabularReward:
         try:
             with np.load(path, allow_pickle=False) as archive:
                 header, values = json.loads(str(archive["header"])), archive["values"]
-        except (ValueError, KeyError, zipfile.BadZipFile, EOFError, TypeError) as error:
+        except FileNotFoundError:
+            raise
+        except (
+            ValueError,
+            KeyError,
+            EOFError,
+            TypeError,
+            NotImplementedError,
+            OSError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ) as error:
             raise InvalidReward(f"{path} holds no reward ({error}): expected a file written by TabularReward.save.") from error
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             raise InvalidReward(f"{path} has format {header!r}: expected {FORMAT!r}. Was it written by a newer version?")
         return cls(values, header.get("note", {}))
+
+
+def as_reward(reward: Any) -> TabularReward:
+    """A TabularReward as it is, or one made of an array (S,) or (S, A).
+
+    Raises:
+        InvalidReward: an array of another shape, or with values that are not finite.
+    """
+    return reward if isinstance(reward, TabularReward) else TabularReward(np.asarray(reward))
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays as json has them."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)

@@ -5,15 +5,22 @@ was killed and is started again with the same configuration continues after the 
 in the same folder is refused, never overwritten.
 """
 
+import contextlib
 import json
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from irl_gym.errors import RunConflict
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # not on Windows; there two processes in one folder are not kept apart
+    fcntl = None
 
 _RECORDS = ".stages"
 
@@ -23,6 +30,18 @@ def write_json(path: Path, content: Any) -> None:
     beside = path.with_name(f".{path.name}.tmp")
     beside.write_text(json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n")
     beside.replace(path)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a json object.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    content = json.loads(path.read_text())
+    if not isinstance(content, dict):
+        raise ValueError(f"expected an object, found a {type(content).__name__}")
+    return content
 
 
 class RunFolder:
@@ -42,11 +61,16 @@ class RunFolder:
         known = self.path / "config.json"
         if known.exists():
             self._compare(known, wanted)
-        elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+            return
+        if self.path.exists() and (not self.path.is_dir() or any(not _beside(one) for one in self.path.iterdir())):
             raise RunConflict(f"{self.path} exists and holds no run: expected a new or empty folder. Choose another --out.")
-        else:
+        try:
             self.path.mkdir(parents=True, exist_ok=True)
             write_json(known, wanted)
+        except OSError as error:
+            raise RunConflict(
+                f"{self.path} cannot be written ({error}): expected a folder of yours. Choose another --out."
+            ) from error
 
     def _compare(self, known: Path, wanted: dict[str, Any]) -> None:
         try:
@@ -57,11 +81,12 @@ class RunFolder:
             ) from error
         if not isinstance(found, dict):
             found = {}
-        changed = [key for key in sorted({*found, *wanted}) if found.get(key) != wanted.get(key)]
+        before, now = dict(_leaves(found)), dict(_leaves(wanted))
+        changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
         if changed:
             key = changed[0]
             raise RunConflict(
-                f"{self.path} holds another run: its {key} is {found.get(key)!r}, this one's is {wanted.get(key)!r}. Choose "
+                f"{self.path} holds another run: its {key} is {before.get(key)!r}, this one's is {now.get(key)!r}. Choose "
                 "another --out, or delete the folder."
             )
 
@@ -69,8 +94,31 @@ class RunFolder:
         return self.path / _RECORDS / f"{stage}.json"
 
     def done(self, stage: str) -> bool:
-        """Was this stage finished, now or in an earlier run?"""
-        return self._record(stage).exists()
+        """Was this stage finished, now or in an earlier run, and are its files still there?"""
+        return self._read(stage) is not None
+
+    def _read(self, stage: str) -> dict[str, Any] | None:
+        """The record of a finished stage; None if there is none, it cannot be read, or a file of the stage is gone."""
+        try:
+            record = json.loads(self._record(stage).read_text())
+            whole = all((self.path / name).exists() for name in record["files"])
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+        return record if whole else None
+
+    def load(self, name: str, read: Callable[[Path], Any]) -> Any:
+        """Read a file that a stage left.
+
+        Raises:
+            RunConflict: it cannot be read.
+        """
+        try:
+            return read(self.path / name)
+        except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
+            raise RunConflict(
+                f"{self.path / name} cannot be read ({type(error).__name__}: {error}): it was changed after the run. Delete "
+                "it, and its stage is run again."
+            ) from error
 
     def run(self, stage: str, make: Callable[[Path], Mapping[str, Any]]) -> dict[str, Any]:
         """Run a stage, unless it was finished before; return its record.
@@ -78,15 +126,43 @@ class RunFolder:
         Args:
             stage: its name.
             make: writes the stage's files into the folder it is given, and returns a record of json values.
+
+        Returns:
+            The record, with `seconds` and `files`; and `kept`, true, if the stage was finished in an earlier run.
+
+        Raises:
+            RunConflict: another process works in the folder.
         """
-        if self.done(stage):
-            return json.loads(self._record(stage).read_text())
+        finished = self._read(stage)
+        if finished is not None:
+            return {**finished, "kept": True}
+        with self._alone():
+            return self._make(stage, make)
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold the folder, so that no other process writes into it; the system lets go when the process ends, however it does.
+
+        Raises:
+            RunConflict: another process holds it.
+        """
+        with (self.path / ".lock").open("w") as file:
+            if fcntl is not None:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except OSError as error:
+                    raise RunConflict(f"another process works in {self.path}: wait for it, or choose another --out.") from error
+            yield
+
+    def _make(self, stage: str, make: Callable[[Path], Mapping[str, Any]]) -> dict[str, Any]:
         beside = self.path / f".{stage}.tmp"
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir()
         start = time.perf_counter()
         record = {**make(beside), "seconds": time.perf_counter() - start}
-        for made in sorted(beside.iterdir()):
+        files = sorted(beside.iterdir())
+        record["files"] = [made.name for made in files]
+        for made in files:
             final = self.path / made.name
             if final.is_dir():
                 shutil.rmtree(final)
@@ -95,3 +171,17 @@ class RunFolder:
         self._record(stage).parent.mkdir(exist_ok=True)
         write_json(self._record(stage), record)
         return record
+
+
+def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested objects with their dotted names."""
+    if not isinstance(content, dict):
+        yield prefix, content
+        return
+    for key, value in content.items():
+        yield from _leaves(value, f"{prefix}.{key}" if prefix else key)
+
+
+def _beside(path: Path) -> bool:
+    """Is this what a write that was cut off left?"""
+    return path.name.startswith(".") and ".tmp" in path.name

@@ -2,13 +2,14 @@
 
 A copy of the environment runs with random actions, without its TimeLimit. Three comparisons:
     support      a transition that the table says is impossible, or one that ends when the table says it goes on, is an error
-    probability  Pearson's chi-square over the rows visited often enough that each successor is expected 5 times
-    reward       each row's rewards against the table's: exactly where a row always pays the same, else their mean within six
-                 standard errors
+    probability  Pearson's chi-square over first states and rows, where each value is expected at least 5 times
+    reward       each payment against the table's, exactly; where s, a and s' do not settle it, the mean of each row within
+                 Bernstein's bound
 """
 
 import copy
 from dataclasses import dataclass
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,11 +17,26 @@ from scipy.stats import chi2
 
 from irl_gym._typing import Matrix
 from irl_gym.errors import NotTabular, TableMismatch
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.states import StateIndex
 
-LEAST_P_VALUE = 1e-6
-"""A right table fails the chi-square test once in a million checks."""
+LEAST_P_VALUE = 1e-9
+"""Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are expected: a
+right table fails about 3 checks in a million."""
+
+
+@dataclass(frozen=True, eq=False)
+class Payments:
+    """What the table says of rewards."""
+
+    mean: Matrix
+    """(S, A) expected reward of a step."""
+    deviation: Matrix
+    """(S, A) its standard deviation."""
+    entries: np.ndarray | None
+    """(nnz,) reward of each transition in the order of P.data; None where s, a and s' do not settle it."""
+    largest: float
+    """The largest |reward| of any step."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +58,7 @@ class SelfCheck:
 
 
 def compare_with_steps(
-    env: gym.Env, mdp: TabularMDP, states: StateIndex, R: Matrix, deviation: Matrix, *, steps: int, seed: int
+    env: gym.Env, mdp: TabularMDP, states: StateIndex, payments: Payments, *, steps: int, seed: int
 ) -> SelfCheck:
     """Sample steps of a copy of the environment and compare them with a table.
 
@@ -53,27 +69,28 @@ def compare_with_steps(
     walker = _copy_of(env)
     rng = np.random.default_rng(seed)
     A = mdp.n_actions
-    first_action = int(getattr(env.action_space, "start", 0))
-    seen = np.empty((steps, 2), dtype=np.int64)
-    paid = np.empty(steps)
-    row = states.encode(walker.reset(seed=seed)[0])
-    _check_start(mdp, row)
+    first_action = int(getattr(walker.action_space, "start", 0))
+    seen, paid, starts = np.empty((steps, 2), dtype=np.int64), np.empty(steps), []
     limit = 20 * mdp.n_states  # a walk that never ends is started again
-    age = 0
+
+    def begin(**kwargs: Any) -> int:
+        starts.append(states.encode(walker.reset(**kwargs)[0]))
+        _check_start(mdp, starts[-1])
+        return starts[-1]
+
+    row, age = begin(seed=seed), 0
     for i in range(steps):
         a = int(rng.integers(A))
-        observation, paid[i], terminated, _, _ = walker.step(a + first_action)
+        observation, paid[i], terminated, truncated, _ = walker.step(a + first_action)
         following = states.encode(observation, terminated=bool(terminated))
         seen[i] = row * A + a, following
         _check_transition(mdp, row, a, following, bool(terminated))
         age += 1
-        if terminated or age >= limit:
-            row, age = states.encode(walker.reset()[0]), 0
-            _check_start(mdp, row)
-        else:
-            row = following
-    _check_rewards(R, deviation, seen[:, 0], paid)
-    return _chi_square(mdp, seen, steps)
+        row = following
+        if terminated or truncated or age >= limit:
+            row, age = begin(), 0
+    _check_rewards(mdp, payments, seen, paid)
+    return _chi_square(mdp, seen, np.array(starts))
 
 
 def _copy_of(env: gym.Env) -> gym.Env:
@@ -109,45 +126,59 @@ def _check_transition(mdp: TabularMDP, s: int, a: int, following: int, terminate
         )
 
 
-def _check_rewards(R: np.ndarray, deviation: np.ndarray, rows: np.ndarray, paid: np.ndarray) -> None:
-    expected = R.ravel()
-    certain = deviation.ravel()[rows] == 0
-    wrong = np.flatnonzero(certain & ~np.isclose(paid, expected[rows], rtol=1e-6, atol=1e-9))
+def _check_rewards(mdp: TabularMDP, payments: Payments, seen: np.ndarray, paid: np.ndarray) -> None:
+    rows = seen[:, 0]
+    if payments.entries is not None:  # s, a and s' settle what is paid
+        expected = payments.entries[entry_positions(mdp.P, rows, seen[:, 1])]
+    else:
+        certain = payments.deviation.ravel()[rows] == 0
+        expected = np.where(certain, payments.mean.ravel()[rows], paid)
+    wrong = np.flatnonzero(~np.isclose(paid, expected, rtol=1e-6, atol=1e-9 * payments.largest))
     if wrong.size:
-        s, a = divmod(int(rows[wrong[0]]), R.shape[1])
+        (s, a), following = divmod(int(rows[wrong[0]]), mdp.n_actions), int(seen[wrong[0], 1])
         raise TableMismatch(
-            f"step from (s={s}, a={a}) paid {paid[wrong[0]]}: the table says {R[s, a]:.6g}. Is the reward changed outside the "
-            "published P?"
+            f"step from (s={s}, a={a}) to {following} paid {paid[wrong[0]]}: the table says {expected[wrong[0]]:.6g}. Is the "
+            "reward changed outside the published P?"
         )
-    visits = np.maximum(np.bincount(rows, minlength=R.size), 1)
-    mean = np.bincount(rows, weights=paid, minlength=R.size) / visits
-    allowed = 6 * deviation.ravel() / np.sqrt(visits) + 1e-9
-    far = np.flatnonzero((visits >= 30) & (deviation.ravel() > 0) & (np.abs(mean - expected) > allowed))
+    visits = np.maximum(np.bincount(rows, minlength=payments.mean.size), 1)
+    mean = np.bincount(rows, weights=paid, minlength=payments.mean.size) / visits
+    # Bernstein's inequality for payments that differ by at most 2 `largest`, over all rows at once.
+    logarithm = np.log(2 * payments.mean.size / LEAST_P_VALUE)
+    allowed = payments.deviation.ravel() * np.sqrt(2 * logarithm / visits) + 4 / 3 * payments.largest * logarithm / visits
+    gap = np.where(np.bincount(rows, minlength=visits.size) > 0, np.abs(mean - payments.mean.ravel()), 0.0)
+    far = np.flatnonzero(gap > allowed + 1e-9 * payments.largest)
     if far.size:
-        s, a = divmod(int(far[0]), R.shape[1])
+        s, a = divmod(int(far[0]), mdp.n_actions)
         raise TableMismatch(
-            f"{visits[far[0]]} steps from (s={s}, a={a}) paid {mean[far[0]]:.4g} on average: the table says {R[s, a]:.4g}. Is "
-            "the reward changed outside the published P?"
+            f"{visits[far[0]]} steps from (s={s}, a={a}) paid {mean[far[0]]:.4g} on average: the table says "
+            f"{payments.mean[s, a]:.4g}. Is the reward changed outside the published P?"
         )
 
 
-def _chi_square(mdp: TabularMDP, seen: np.ndarray, steps: int) -> SelfCheck:
+def _chi_square(mdp: TabularMDP, seen: np.ndarray, starts: np.ndarray) -> SelfCheck:
     visits = np.bincount(seen[:, 0], minlength=mdp.P.shape[0])
-    statistic, degrees = 0.0, 0
+    first = np.flatnonzero(mdp.d0)
+    statistic, degrees = _pearson(starts, first, mdp.d0[first])
+    order = np.argsort(seen[:, 0], kind="stable")
+    groups = np.split(seen[order, 1], np.cumsum(visits)[:-1])
     for row in np.flatnonzero(visits):
-        columns = mdp.P.indices[mdp.P.indptr[row] : mdp.P.indptr[row + 1]]
-        expected = visits[row] * mdp.P.data[mdp.P.indptr[row] : mdp.P.indptr[row + 1]]
-        if columns.size < 2 or expected.min() < 5:
-            continue
-        found = seen[seen[:, 0] == row, 1]
-        counts = np.array([(found == column).sum() for column in columns])
-        statistic += float(((counts - expected) ** 2 / expected).sum())
-        degrees += columns.size - 1
+        part = slice(mdp.P.indptr[row], mdp.P.indptr[row + 1])
+        one, freedom = _pearson(groups[row], mdp.P.indices[part], mdp.P.data[part])
+        statistic, degrees = statistic + one, degrees + freedom
     p_value = float(chi2.sf(statistic, degrees)) if degrees else 1.0
     if p_value < LEAST_P_VALUE:
         raise TableMismatch(
-            f"{steps} steps differ from the table's probabilities: chi-square {statistic:.1f} on {degrees} degrees of "
+            f"{len(seen)} steps differ from the table's probabilities: chi-square {statistic:.1f} on {degrees} degrees of "
             f"freedom, p = {p_value:.1e}. Something acts outside the published P."
         )
     acting = mdp.reachable & ~mdp.terminal
-    return SelfCheck(steps, int((visits > 0).sum()), int(acting.sum()) * mdp.n_actions, statistic, degrees, p_value)
+    return SelfCheck(len(seen), int((visits > 0).sum()), int(acting.sum()) * mdp.n_actions, statistic, degrees, p_value)
+
+
+def _pearson(found: np.ndarray, values: np.ndarray, probabilities: np.ndarray) -> tuple[float, int]:
+    """Pearson's statistic and degrees of freedom; 0, 0 where some value is expected fewer than 5 times."""
+    expected = found.size * probabilities
+    if values.size < 2 or expected.min() < 5:
+        return 0.0, 0
+    counts = np.array([(found == value).sum() for value in values])
+    return float(((counts - expected) ** 2 / expected).sum()), values.size - 1

@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import Vector
+from irl_gym.checks import checked_number
 from irl_gym.dynamic_programming import backup, policy_iteration
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP
@@ -47,8 +48,7 @@ class PositiveScaling:
     """Above 0."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.factor < np.inf:
-            raise InvalidParameter(f"factor is {self.factor}: expected a finite number above 0.")
+        checked_number("factor", self.factor, "a finite number above 0", above=0)
 
     def apply(self, reward: TabularReward, mdp: TabularMDP) -> TabularReward:
         """The scaled reward, of the same shape."""
@@ -90,7 +90,7 @@ class ExpectedAdvantage:
     What an agent pays is then what its action loses, at once: the optimal actions, 0, are greedy whatever the discount.
     With `clip` = tau every loss counts up to tau, in units of tau: R' = max(A, -tau) / tau, between -1 and 0. Optimal actions
     still pay 0 and all others less, so the optimal policies stay (a sum of non-positive payments is 0 only if all are).
-    A loss within the rounding of V, relative 1e-12, is no loss: ties stay ties.
+    A loss within the rounding of V, 1e-12 max |Q| / (1 - gamma), is no loss: ties stay ties.
 
     Raises:
         InvalidParameter: a clip that is not positive.
@@ -100,15 +100,15 @@ class ExpectedAdvantage:
     """tau > 0, in units of the reward's values; None for the advantage itself."""
 
     def __post_init__(self) -> None:
-        if self.clip is not None and not 0 < self.clip < np.inf:
-            raise InvalidParameter(f"clip is {self.clip}: expected a finite number above 0, or None.")
+        if self.clip is not None:
+            checked_number("clip", self.clip, "a finite number above 0, or None", above=0)
 
     def apply(self, reward: TabularReward, mdp: TabularMDP) -> TabularReward:
         """The advantage (S, A)."""
         Q = policy_iteration(mdp, reward.expected(mdp)).Q
         advantage = Q - Q.max(axis=1, keepdims=True)
-        rounding = 1e-12 * max(1.0, float(np.abs(Q).max())) / (1 - mdp.gamma)
-        advantage[advantage > -rounding] = 0.0
+        rounding = 1e-12 * float(np.abs(Q).max()) / (1 - mdp.gamma)
+        advantage[advantage >= -rounding] = 0.0
         if self.clip is not None:
             advantage = np.maximum(advantage, -self.clip) / self.clip
         advantage[mdp.terminal] = 0.0

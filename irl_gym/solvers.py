@@ -12,7 +12,8 @@ from typing import Any, Literal
 
 import cvxpy as cp
 
-from irl_gym.errors import InvalidParameter, SolverFailed, SolverTimeout
+from irl_gym.checks import checked_number
+from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
 SolverName = Literal["auto", "clarabel", "highs"]
 SMALL = 1_500
@@ -68,6 +69,18 @@ _SOLVERS = {
 _OTHER = {"clarabel": "highs", "highs": "clarabel"}
 
 
+def check_solving(solver: Any, time_limit: Any) -> None:
+    """Check what `solve` takes, before anything is built.
+
+    Raises:
+        InvalidParameter: an unknown solver name, or a time limit that is not positive.
+    """
+    if solver not in ("auto", *_SOLVERS):
+        raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
+    if time_limit is not None:
+        checked_number("time_limit", time_limit, "seconds above 0, or None", above=0)
+
+
 def solve(problem: cp.Problem, *, rows: int, solver: SolverName = "auto", time_limit: float | None = None) -> Answer:
     """Solve a linear program; on failure retry once with the other solver.
 
@@ -80,12 +93,10 @@ def solve(problem: cp.Problem, *, rows: int, solver: SolverName = "auto", time_l
     Raises:
         InvalidParameter: an unknown solver name, or a time limit that is not positive.
         SolverTimeout: the time limit was reached.
-        SolverFailed: infeasible, unbounded, or no solver gave an answer.
+        SolverInfeasible: the constraints contradict each other.
+        SolverFailed: unbounded, or no solver gave an answer.
     """
-    if solver not in ("auto", *_SOLVERS):
-        raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidParameter(f"time_limit is {time_limit}: expected seconds above 0, or None.")
+    check_solving(solver, time_limit)
     first = ("highs" if rows <= SMALL else "clarabel") if solver == "auto" else solver
     start = time.perf_counter()
     failures: list[str] = []
@@ -96,9 +107,11 @@ def solve(problem: cp.Problem, *, rows: int, solver: SolverName = "auto", time_l
             stats = problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats is not None else 0
             return Answer(status, name, time.perf_counter() - start, float(problem.value), iterations, attempt)  # pyright: ignore
+        if problem.status == cp.INFEASIBLE:
+            raise SolverInfeasible(f"{name} finds that the constraints contradict each other: no reward satisfies them.")
         failures.append(f"{name}: {failure}")
     reasons = "; ".join(failures)
-    if "time limit" in reasons and "infeasible" not in reasons and "unbounded" not in reasons:
+    if "time limit" in reasons and "unbounded" not in reasons:
         raise SolverTimeout(f"no answer in {time_limit} s ({reasons}): raise time_limit, or choose the other solver.")
     raise SolverFailed(f"no solver gave an answer ({reasons}): rescale the problem, or report it with its table.")
 

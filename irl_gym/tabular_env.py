@@ -13,7 +13,7 @@ from gymnasium import spaces
 
 from irl_gym.errors import InvalidInput
 from irl_gym.mdp import TabularMDP, TransitionTable
-from irl_gym.rewards import TabularReward
+from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.sampling import Successors
 
 
@@ -31,7 +31,8 @@ class TabularEnv(gym.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's own convention)
 
-    def __init__(self, table: TransitionTable, reward: TabularReward, render_mode: str | None = None):
+    def __init__(self, table: TransitionTable, reward: TabularReward | np.ndarray, render_mode: str | None = None):
+        reward = as_reward(reward)
         reward.expected(table)  # checks the shape
         self.table, self.reward, self.render_mode = table, reward, render_mode
         self.observation_space = spaces.Discrete(table.n_states)
@@ -75,9 +76,9 @@ class TabularEnv(gym.Env[Any, Any]):
         """
         super().reset(seed=seed)
         wanted = None if options is None else options.get("state")
-        if wanted is not None and (not 0 <= wanted < self.table.n_states or self.table.terminal[wanted]):
+        if wanted is not None and (not self.observation_space.contains(wanted) or self.table.terminal[wanted]):
             raise InvalidInput(
-                f'options["state"] is {wanted}: expected a state from 0 to {self.table.n_states - 1} that is not terminal.'
+                f'options["state"] is {wanted!r}: expected a state from 0 to {self.table.n_states - 1} that is not terminal.'
             )
         self.s = int(self._successors.start(1, self.np_random)[0]) if wanted is None else int(wanted)
         self.last_action = None

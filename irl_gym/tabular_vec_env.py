@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.mdp import TransitionTable
-from irl_gym.rewards import TabularReward
+from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.sampling import Successors
 from irl_gym.states import StateIndex
 
@@ -41,13 +41,14 @@ class TabularVecEnv(VecEnv):
     def __init__(
         self,
         table: TransitionTable,
-        reward: TabularReward,
+        reward: TabularReward | np.ndarray,
         *,
         num_envs: int = 64,
         max_episode_steps: int | None = None,
         states: StateIndex | None = None,
         seed: int | None = None,
     ):
+        reward = as_reward(reward)
         reward.expected(table)  # checks the shape
         for name, value in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
             if value is not None and value < 1:

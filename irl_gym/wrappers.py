@@ -1,12 +1,20 @@
 """A learned reward in place of an environment's own."""
 
+import os
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 from irl_gym.errors import InvalidInput, InvalidReward
-from irl_gym.rewards import RewardFunction, TabularReward
+from irl_gym.rewards import RewardFunction, TabularReward, as_reward
 from irl_gym.states import StateIndex
+
+
+def _as_function(reward: RewardFunction | np.ndarray | str) -> RewardFunction:
+    if isinstance(reward, str):
+        return TabularReward.load(reward)
+    return as_reward(reward) if isinstance(reward, np.ndarray) else reward
 
 
 class LearnedReward(gym.Wrapper, gym.utils.RecordConstructorArgs):
@@ -17,18 +25,19 @@ class LearnedReward(gym.Wrapper, gym.utils.RecordConstructorArgs):
 
     Args:
         env: any environment whose observations `states` knows.
-        reward: what is paid, or the path of a file that holds it.
+        reward: what is paid: a reward function, an array (S,) or (S, A), or the path of a file that holds one.
         states: turns observations into rows; the default numbers the observation space.
 
     Raises:
         NotDiscrete: no state index is given and the observation space is not made of integers.
-        InvalidReward: a reward for another number of states than the index has.
+        InvalidReward: a reward for another number of states or actions.
     """
 
-    def __init__(self, env: gym.Env, reward: RewardFunction | str, states: StateIndex | None = None):
+    def __init__(self, env: gym.Env, reward: RewardFunction | np.ndarray | str | os.PathLike, states: StateIndex | None = None):
+        reward = os.fspath(reward) if isinstance(reward, os.PathLike) else reward
         gym.utils.RecordConstructorArgs.__init__(self, reward=reward, states=states)
         gym.Wrapper.__init__(self, env)
-        self.reward_function = TabularReward.load(reward) if isinstance(reward, str) else reward
+        self.reward_function = _as_function(reward)
         self.states = StateIndex(env.observation_space) if states is None else states
         size = getattr(self.reward_function, "n_states", self.states.n_states)
         if size != self.states.n_states:
@@ -36,6 +45,9 @@ class LearnedReward(gym.Wrapper, gym.utils.RecordConstructorArgs):
                 f"the reward has {size} states: expected {self.states.n_states}, those of {self.states.space}. Give the "
                 "`states` of the Tabulation that the reward was learned on."
             )
+        shape = np.shape(getattr(self.reward_function, "values", ()))
+        if len(shape) == 2 and shape[-1] != getattr(env.action_space, "n", None):
+            raise InvalidReward(f"the reward has {shape[-1]} actions: expected those of {env.action_space}.")
         self._first_action = int(getattr(env.action_space, "start", 0))
         self._row: int | None = None
 

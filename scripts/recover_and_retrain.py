@@ -36,7 +36,7 @@ class Arguments:
     expert: PlannerName = "value-iteration"
     """Who demonstrates: exact planning, or an SB3 agent trained on the true reward."""
     episodes: int = 500
-    """Demonstrations recorded."""
+    """Demonstrations recorded; the linear program learns from the expert's whole policy, not from them."""
     learner: Literal["finite-lp"] = "finite-lp"
     """Ng & Russell's linear program for finite state spaces."""
     l1: float | Literal["auto"] = 0.0
@@ -46,7 +46,7 @@ class Arguments:
     reward_on: Literal["state", "state-action"] = "state"
     """What the recovered reward is a function of."""
     shaping: bool = True
-    """Retrain on the expected advantage under the recovered reward; else on the reward as it is."""
+    """Retrain on the expected advantage under the recovered reward, computed from the table; else on the reward as it is."""
     retrain: PlannerName = "ppo"
     """Who learns from the recovered reward."""
     total_timesteps: int = 400_000
@@ -75,6 +75,9 @@ def main(arguments: Arguments) -> int:
         with bar:
             asked = experiment(arguments)
             report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show)
+    except KeyboardInterrupt:
+        Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
+        return 130
     except IrlGymError as error:
         text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
         Console(stderr=True, soft_wrap=True).print(text)

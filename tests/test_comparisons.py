@@ -53,7 +53,7 @@ def test_compare_measures_a_stochastic_expert_by_its_mixture():
 
 def test_compare_knows_the_actions_of_the_expert():
     model = models.random_model(0)
-    np.testing.assert_array_equal(compare(model.mdp, model.expert).expert_set, np.eye(3, dtype=bool)[model.expert])
+    np.testing.assert_array_equal(compare(model.mdp, model.expert).distribution, np.eye(3)[model.expert])
 
 
 def test_compare_refuses_what_is_no_policy():

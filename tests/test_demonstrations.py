@@ -8,7 +8,7 @@ from scipy.stats import ks_2samp
 
 from irl_gym.demonstrations import Episode, collect, collect_from_table, empirical_policy, feature_expectations
 from irl_gym.dynamic_programming import occupancy, policy_iteration
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidParameter
 from irl_gym.metrics import policy_value
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.states import StateIndex
@@ -33,7 +33,7 @@ def expert(lake):
 
 def drawn(lake, policy, n, **kwargs):
     settings = {"seed": 0, "max_episode_steps": 100, **kwargs}
-    return list(collect_from_table(lake.mdp, lake.entry_rewards, lake.states, policy, n, **settings))
+    return list(collect_from_table(lake.mdp, lake.payments.entries, lake.states, policy, n, **settings))
 
 
 def stepped(lake, policy, n, **kwargs):
@@ -87,7 +87,7 @@ def test_episodes_of_a_table_end_as_the_table_says(lake, expert):
 def test_collect_from_table_refuses_nothing_to_do(lake, expert, wrong):
     settings = {"n_episodes": 1, "max_episode_steps": 1, **wrong}
     with pytest.raises(InvalidParameter, match="is 0"):
-        list(collect_from_table(lake.mdp, lake.entry_rewards, lake.states, expert, **settings))
+        list(collect_from_table(lake.mdp, lake.payments.entries, lake.states, expert, **settings))
 
 
 @pytest.mark.parametrize(
@@ -139,3 +139,14 @@ def test_feature_expectations_approach_the_occupancy(lake, expert):
 def test_feature_expectations_refuse_features_of_the_wrong_length():
     with pytest.raises(InvalidParameter, match=r"\(5, 5\)"):
         feature_expectations([episode([0, 1], [0])], np.eye(5), STATES, 0.9)
+
+
+@pytest.mark.parametrize("actions", [np.array([0.5]), np.array([[0]])])
+def test_an_episode_refuses_actions_that_are_not_integers(actions):
+    with pytest.raises(InvalidDemonstrations, match="integers"):
+        Episode(np.array([0, 1]), actions, np.zeros(1), True, False)
+
+
+def test_feature_expectations_refuse_a_discount_outside_the_interval():
+    with pytest.raises(InvalidDiscount, match="gamma is 2"):
+        feature_expectations([episode([0, 1], [0])], np.eye(4), STATES, 2.0)

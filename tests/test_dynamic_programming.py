@@ -6,16 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irl_gym.dynamic_programming import (
+    Discounted,
     backup,
     evaluate_policy,
     greedy,
     occupancy,
     policy_iteration,
-    solve_discounted,
     tied,
     value_iteration,
 )
 from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
+from irl_gym.mdp import TabularMDP
+from irl_gym.rewards import TabularReward
 
 planners = pytest.mark.parametrize("plan", [value_iteration, policy_iteration])
 policies = st.sampled_from(["actions", "probabilities", "set"])
@@ -166,9 +168,9 @@ def test_occupancy_is_zero_in_terminal_states():
     assert (occupancy(model.mdp, model.expert)[model.mdp.terminal] == 0).all()
 
 
-def test_solve_discounted_transposed_solves_the_transposed_system():
+def test_discounted_solves_the_transposed_system():
     model = models.random_model(0)
-    x = solve_discounted(model.mdp.P_pi(model.expert), 0.9, model.R, transpose=True)
+    x = Discounted(model.mdp.P_pi(model.expert), 0.9).solve_transposed(model.R)
     P_pi = model.P[np.arange(7), model.expert]
     np.testing.assert_allclose((np.eye(7) - 0.9 * P_pi).T @ x, model.R)
 
@@ -232,3 +234,23 @@ def test_policy_iteration_refuses_a_state_without_allowed_actions():
 def test_evaluate_policy_refuses_what_is_no_policy(policy, unchecked):
     with pytest.raises(InvalidPolicy, match="expected"):
         evaluate_policy(models.random_model(0).mdp, np.zeros((7, 3)), policy)
+
+
+def test_planning_takes_a_tabular_reward_as_it_is():
+    model = models.random_model(0, kind="terminal")
+    reward = TabularReward(model.R)
+    assert np.array_equal(value_iteration(model.mdp, reward).V, value_iteration(model.mdp, reward.expected(model.mdp)).V)
+
+
+@pytest.mark.parametrize("gamma", [0.9, 0.999, 0.9999])
+def test_value_iteration_bounds_its_error_rounding_included(gamma):
+    loop = TabularMDP(np.ones((1, 1)), gamma, [1.0])
+    solution = value_iteration(loop, np.ones((1, 1)), sweeps=50)
+    assert 0 < abs(solution.V[0] - 1 / (1 - gamma)) <= solution.error or solution.V[0] == 1 / (1 - gamma)
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e12])
+def test_policy_iteration_does_not_depend_on_the_scale_of_the_reward(factor):
+    model = models.random_model(1)
+    R = model.step_reward
+    assert np.array_equal(policy_iteration(model.mdp, R).policy, policy_iteration(model.mdp, factor * R).policy)

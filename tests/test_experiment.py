@@ -2,8 +2,12 @@
 
 import pytest
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidDiscount, InvalidParameter
 from irl_gym.experiment import Experiment, parse_keywords
+
+
+def lake(**kwargs):
+    return Experiment("FrozenLake-v1", 0.99, **kwargs)
 
 
 @pytest.mark.parametrize(
@@ -27,8 +31,19 @@ def test_parse_keywords_refuses(part):
 
 
 def test_experiments_that_differ_have_names_that_differ():
-    assert Experiment(seed=0).name != Experiment(seed=1).name
+    assert lake(seed=0).name != lake(seed=1).name
 
 
 def test_an_experiments_name_does_not_change():
-    assert Experiment(env_id="a:b/C-v0").name == Experiment(env_id="a:b/C-v0").name
+    assert Experiment("a:b/C-v0", 0.9).name == Experiment("a:b/C-v0", 0.9).name
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32])
+def test_a_seed_that_sb3_does_not_take_is_refused(seed):
+    with pytest.raises(InvalidParameter, match=f"seed is {seed}"):
+        lake(seed=seed)
+
+
+def test_a_discount_outside_the_interval_is_refused():
+    with pytest.raises(InvalidDiscount, match="gamma is 1"):
+        Experiment("FrozenLake-v1", 1.0)

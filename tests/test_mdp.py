@@ -196,3 +196,21 @@ def test_p_a_refuses_an_action_outside_the_table(action):
 def test_p_pi_refuses_an_action_outside_the_table(policy, message):
     with pytest.raises(InvalidPolicy, match=message):
         TabularMDP.from_dense(table(), 0.9, UNIFORM).P_pi(policy)
+
+
+def test_a_table_refuses_new_values_for_its_attributes():
+    mdp = TabularMDP(np.eye(2, k=1), 0.9, [1, 0])
+    with pytest.raises(AttributeError, match=r"TabularMDP\.gamma cannot be set"):
+        mdp.gamma = 0.5
+
+
+@pytest.mark.parametrize("gamma", ["0.9", None, True, np.array([0.9])])
+def test_a_discount_that_is_no_number_is_refused(gamma, unchecked):
+    with pytest.raises(InvalidDiscount, match="expected a discount strictly between 0 and 1"):
+        TabularMDP(np.eye(2, k=1), gamma, [1, 0])
+
+
+@pytest.mark.parametrize("P", [[["a"]], [[1.0], [0.5, 0.5]]])
+def test_a_table_that_cannot_be_read_as_numbers_is_refused(P):
+    with pytest.raises(InvalidMDP, match="P is list that cannot be read as numbers"):
+        TabularMDP(P, 0.9, [1.0])

@@ -23,7 +23,7 @@ SMALL = {"episodes": 20, "eval_episodes": 20, "num_envs": 16, "env_kwargs": {"is
 
 
 def small(**kwargs):
-    return Experiment(**{"retrain": SB3(total_timesteps=30_000), **SMALL, **kwargs})
+    return Experiment("FrozenLake-v1", 0.99, **{"retrain": SB3(total_timesteps=30_000), **SMALL, **kwargs})
 
 
 @pytest.fixture(scope="module")
@@ -123,14 +123,14 @@ def test_an_sb3_expert_can_demonstrate(tmp_path):
 
 def test_an_environment_that_pays_by_luck_is_stepped(tmp_path):
     made = recover_and_retrain(
-        Experiment(env_id="CliffWalkingSlippery-v1", episodes=5, eval_episodes=5, retrain=ValueIteration(),
+        Experiment("CliffWalkingSlippery-v1", 0.99, episodes=5, eval_episodes=5, retrain=ValueIteration(),
                    learner=FiniteLP(reward_on="state-action")), tmp_path,
     )  # fmt: skip
     assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
 
 
 def test_our_own_environments_work_by_module_and_id(tmp_path):
-    asked = Experiment(env_id="irl_gym_envs:irl_gym/GridWorld-v0", episodes=5, eval_episodes=5, retrain=ValueIteration())
+    asked = Experiment("irl_gym_envs:irl_gym/GridWorld-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration())
     assert recover_and_retrain(asked, tmp_path).metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
 
 
@@ -140,7 +140,7 @@ def test_our_own_environments_work_by_module_and_id(tmp_path):
 )
 def test_an_environment_that_cannot_be_used_is_refused_before_anything_is_written(tmp_path, env_id, error, match):
     with pytest.raises(error, match=match):
-        recover_and_retrain(Experiment(env_id=env_id), tmp_path / "run")
+        recover_and_retrain(Experiment(env_id, 0.99), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -148,7 +148,7 @@ def test_an_expert_that_no_reward_explains_stops_the_run_with_its_reason(tmp_pat
     from irl_gym_envs.grid_world import GridWorldEnv  # noqa: F401  (registers)
 
     corridor = {"size": [1, 2], "slip": 1.0, "goals": [[0, 1]], "start": [0, 0], "terminal_goal": False}
-    asked = Experiment(env_id="irl_gym_envs:irl_gym/GridWorld-v0", env_kwargs=corridor, episodes=1)
+    asked = Experiment("irl_gym_envs:irl_gym/GridWorld-v0", 0.9, env_kwargs=corridor, episodes=1)
     with pytest.raises(DegenerateExpert, match="state-action"):
         recover_and_retrain(asked, tmp_path)
 
@@ -156,7 +156,7 @@ def test_an_expert_that_no_reward_explains_stops_the_run_with_its_reason(tmp_pat
 @pytest.mark.parametrize("wrong", [{"episodes": 0}, {"num_envs": 0}, {"eval_episodes": -1}])
 def test_an_experiment_refuses_nothing_to_do(wrong):
     with pytest.raises(InvalidParameter, match=next(iter(wrong))):
-        Experiment(**wrong)
+        small(**wrong)
 
 
 def test_the_configuration_is_json():

@@ -9,11 +9,14 @@ from models import episodic_model
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from irl_gym import metrics
-from irl_gym.errors import InvalidParameter, NotTabular
+from irl_gym.errors import InvalidDiscount, InvalidParameter, NotTabular
+from irl_gym.mdp import TransitionTable
 from irl_gym.planners import SB3, ValueIteration, load_agent, tabular_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.states import StateIndex
 from irl_gym.tabular_vec_env import TabularVecEnv
+from irl_gym.tabulate import tabulate
+from irl_gym.wrappers import LearnedReward
 
 
 @pytest.fixture
@@ -44,8 +47,6 @@ def test_value_iteration_uses_the_discount_asked_for():
     P[0, 3] = P[1, 1] = P[2, 2] = P[3, 2] = P[4, 3] = P[5, 3] = 1
     R = np.zeros((4, 2))
     R[0, 0], R[2] = 1.0, 3.0
-    from irl_gym.mdp import TransitionTable
-
     vec = TabularVecEnv(TransitionTable(P, np.eye(4)[0]), TabularReward(R), num_envs=1)
     actions = [tabular_actions((p := ValueIteration().plan(vec, gamma=g)), p.states)[0] for g in (0.5, 0.9)]
     assert actions == [0, 1]
@@ -108,7 +109,7 @@ def test_an_agent_acts_the_same_after_saving_and_loading(vec, tmp_path):
     assert np.array_equal(tabular_actions(agent, states), tabular_actions(again, states))
 
 
-@pytest.mark.parametrize("make", [lambda: SB3("SAC"), lambda: load_agent("agent.zip", "SAC")])  # pyright: ignore
+@pytest.mark.parametrize("make", [lambda: SB3("SAC"), lambda: load_agent(__file__, "SAC")])  # pyright: ignore
 @pytest.mark.usefixtures("unchecked")
 def test_an_unknown_algorithm_is_refused(make):
     with pytest.raises(InvalidParameter, match=r"'SAC'.*PPO"):
@@ -118,3 +119,48 @@ def test_an_unknown_algorithm_is_refused(make):
 def test_sb3_refuses_to_train_for_no_steps():
     with pytest.raises(InvalidParameter, match="total_timesteps is 0"):
         SB3("PPO", 0)
+
+
+def test_value_iteration_plans_for_the_reward_that_a_wrapper_pays():
+    hole = np.zeros(16)
+    hole[5] = 1.0
+    learned = LearnedReward(gym.make("FrozenLake-v1", is_slippery=False), hole)
+    policy = ValueIteration().plan(learned, gamma=0.9)
+    s, row = 0, []
+    for _ in range(2):
+        s = tabulate(learned, gamma=0.9).mdp.P.indices[s * 4 + tabular_actions(policy, policy.states)[s]]
+        row.append(int(s))
+    assert row[-1] == 5
+
+
+@pytest.mark.parametrize("copies", [1, 7, 33, 64, 100, 512])
+def test_ppo_splits_a_rollout_into_few_batches_of_one_size(model, copies):
+    env = TabularVecEnv(model.mdp, TabularReward(model.R), num_envs=copies, max_episode_steps=50, seed=0)
+    trained = SB3("PPO", 1).plan(env, gamma=0.9).model
+    rollout = trained.n_steps * copies
+    assert rollout % trained.batch_size == 0 and rollout // trained.batch_size <= 16
+
+
+def test_sb3_refuses_an_unknown_hyperparameter(vec):
+    with pytest.raises(InvalidParameter, match="no hyper-parameter 'lr'"):
+        SB3("PPO", 64, {"lr": 1e-3}).plan(vec, gamma=0.9)
+
+
+def test_sb3_refuses_a_discount_outside_the_interval(vec):
+    with pytest.raises(InvalidDiscount, match="gamma is 2"):
+        SB3("PPO", 64).plan(vec, gamma=2.0)
+
+
+def test_load_agent_refuses_a_file_that_holds_none(tmp_path):
+    (tmp_path / "agent.zip").write_text("not a zip")
+    with pytest.raises(InvalidParameter, match=r"agent\.zip holds no PPO agent"):
+        load_agent(tmp_path / "agent.zip", "PPO")
+
+
+def test_load_agent_names_the_file_that_is_missing(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nothing\.zip does not exist"):
+        load_agent(tmp_path / "nothing.zip", "PPO")
+
+
+def test_planners_are_hashable():
+    assert hash(SB3()) == hash(SB3()) and hash(ValueIteration()) == hash(ValueIteration())

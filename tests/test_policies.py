@@ -124,3 +124,13 @@ def test_tabular_policy_probabilities_are_not_writeable():
 def test_tabular_policy_refuses_what_is_no_distribution(probabilities, message):
     with pytest.raises(InvalidPolicy, match=message):
         two_state_policy(probabilities)
+
+
+def test_a_policy_of_actions_is_not_taken_for_probabilities(unchecked):
+    with pytest.raises(InvalidPolicy, match=r"shape \(3,\): expected \(S, A\)"):
+        TabularPolicy(np.zeros(3), StateIndex(spaces.Discrete(3)))
+
+
+def test_a_policy_comes_back_from_pickle_immutable():
+    again = pickle.loads(pickle.dumps(TabularPolicy(np.eye(3), StateIndex(spaces.Discrete(3)))))
+    assert not again.probabilities.flags.writeable

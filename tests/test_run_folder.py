@@ -83,3 +83,51 @@ def test_a_broken_configuration_is_refused(tmp_path, content):
     (tmp_path / "config.json").write_text(content)
     with pytest.raises(RunConflict, match="Choose another --out"):
         RunFolder(tmp_path, CONFIG)
+
+
+def test_a_stage_whose_file_was_deleted_is_run_again(folder):
+    folder.run("one", writing("x"))
+    (folder.path / "a.txt").unlink()
+    folder.run("one", writing("y"))
+    assert (folder.path / "a.txt").read_text() == "y"
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}"])
+def test_a_stage_whose_record_is_broken_is_run_again(folder, content):
+    folder.run("one", writing("x"))
+    (folder.path / ".stages" / "one.json").write_text(content)
+    assert folder.run("one", writing("y"))["content"] == "y"
+
+
+def test_a_record_says_when_the_stage_was_kept(folder):
+    assert ("kept" in folder.run("one", writing("x")), "kept" in folder.run("one", writing("x"))) == (False, True)
+
+
+def test_what_a_cut_off_start_left_does_not_lock_the_folder(tmp_path):
+    (tmp_path / ".config.json.tmp").write_text("{")
+    assert RunFolder(tmp_path, CONFIG).path == tmp_path
+
+
+def test_a_folder_that_cannot_be_written_is_refused():
+    with pytest.raises(RunConflict, match="cannot be written"):
+        RunFolder("/proc/nothing/here", CONFIG)
+
+
+def test_a_nested_difference_is_named_by_its_path(tmp_path):
+    RunFolder(tmp_path, {"learner": {"l1": 0.0, "r_max": 1.0}})
+    with pytest.raises(RunConflict, match=r"its learner\.l1 is 0\.0, this one's is 1\.0"):
+        RunFolder(tmp_path, {"learner": {"l1": 1.0, "r_max": 1.0}})
+
+
+def test_a_file_that_was_changed_is_refused_by_name(folder):
+    folder.run("one", writing("x"))
+    with pytest.raises(RunConflict, match=r"a\.txt cannot be read"):
+        folder.load("a.txt", lambda path: json.loads(path.read_text()))
+
+
+def test_two_at_once_in_one_folder_are_refused(folder):
+    def second(beside):
+        return RunFolder(folder.path, CONFIG).run("two", writing("y"))
+
+    with pytest.raises(RunConflict, match="another process"):
+        folder.run("one", second)

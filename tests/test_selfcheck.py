@@ -3,7 +3,7 @@ import threading
 import gymnasium as gym
 import pytest
 from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
-from tiny_env import TableEnv, both_ways, coin
+from tiny_env import TableEnv, both_ways, coin, lottery
 
 from irl_gym.errors import NotTabular, TableMismatch
 from irl_gym.tabulate import tabulate
@@ -42,14 +42,35 @@ def test_self_check_repeats_itself_with_the_same_seed():
         (coin(1.0), coin(0.5), r"took \(s=0, a=0\) to 0, terminated=False: the table allows \[1\] only"),
         (coin(), coin(ends=False), r"to 1 said terminated=False: the table says True"),
         (coin(0.5, win=0.0), coin(0.6, win=0.0), "differ from the table's probabilities: chi-square"),
-        (coin(0.5, win=1.0, lose=1.0), coin(0.5, win=3.0, lose=3.0), r"\(s=0, a=0\) paid 3\.0: the table says 1"),
-        (coin(0.5, win=1.0, lose=0.0), coin(0.5, win=2.0, lose=0.0), r"paid 1\.\d+ on average: the table says 0\.5"),
+        (coin(0.5, win=1.0, lose=1.0), coin(0.5, win=3.0, lose=3.0), r"\(s=0, a=0\) to \d paid 3\.0: the table says 1"),
+        (lottery(0.5), lottery(0.6), r"paid 0\.\d+ on average: the table says 0\.5"),
+        (lottery(0.0), lottery(0.5), r"to 1 paid 1\.0: the table says 0"),
     ],
-    ids=["support", "termination", "probability", "certain reward", "mean reward"],
+    ids=["support", "termination", "probability", "reward of a transition", "mean reward", "certain reward"],
 )
 def test_self_check_catches_an_environment_that_differs_from_its_table(published, truth, message):
     with pytest.raises(TableMismatch, match=message):
         check(TableEnv(published, [1, 0], truth))
+
+
+def test_self_check_catches_a_start_that_is_more_frequent_than_published():
+    two_starts = [coin()[0], coin()[0], [[(1.0, 2, 0.0, True)]]]
+    with pytest.raises(TableMismatch, match="chi-square"):
+        check(TableEnv(two_starts, [0.5, 0.5, 0], truth_start=[0.99, 0.01, 0]))
+
+
+def test_self_check_accepts_rewards_that_are_rare():
+    for seed in range(10):
+        check(TableEnv(lottery(1e-4), [1, 0]), seed=seed)
+
+
+def test_self_check_begins_anew_where_the_environment_truncates_itself():
+    class Impatient(TableEnv):
+        def step(self, action):
+            *most, _, info = super().step(action)
+            return *most, True, info
+
+    assert check(Impatient(coin(), [1, 0])).steps > 0
 
 
 def test_self_check_catches_a_start_that_differs_from_the_published_one():

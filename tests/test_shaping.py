@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from models import models
+from models import models, random_model
 
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import InvalidParameter
@@ -81,3 +81,10 @@ def test_positive_scaling_refuses(factor):
 def test_expected_advantage_refuses_a_clip(clip):
     with pytest.raises(InvalidParameter, match=str(clip)):
         ExpectedAdvantage(clip)
+
+
+@pytest.mark.parametrize("factor", [1e-11, 1e9])
+def test_expected_advantage_does_not_depend_on_the_scale_of_the_reward(factor):
+    model = random_model(2)
+    plain, scaled = (ExpectedAdvantage(clip=0.1 * f).apply(TabularReward(f * model.R), model.mdp) for f in (1.0, factor))
+    np.testing.assert_allclose(plain.values, scaled.values, atol=1e-6)

@@ -2,12 +2,21 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
-from gymnasium.wrappers import TimeLimit, TransformReward
+from gymnasium.wrappers import RecordEpisodeStatistics, TimeLimit, TransformReward
 from tiny_env import TableEnv, both_ways, coin
 
 from irl_gym.dynamic_programming import policy_iteration
-from irl_gym.errors import InvalidDiscount, NotDiscrete, NotTabular, UnknownEnvironment
+from irl_gym.errors import (
+    InvalidDiscount,
+    InvalidMDP,
+    InvalidParameter,
+    InvalidReward,
+    NotDiscrete,
+    NotTabular,
+    UnknownEnvironment,
+)
 from irl_gym.tabulate import make, tabulate
+from irl_gym.wrappers import LearnedReward
 
 
 def table_of(env, **kwargs):
@@ -78,7 +87,7 @@ def test_tabulate_averages_the_reward_over_successors():
 
 def test_tabulate_knows_how_far_a_reward_strays_from_its_mean():
     table = table_of(TableEnv(coin(0.25, win=4.0, lose=0.0), [1, 0]))
-    assert table.reward_deviation[0, 0] == pytest.approx(4 * np.sqrt(0.25 * 0.75))
+    assert table.payments.deviation[0, 0] == pytest.approx(4 * np.sqrt(0.25 * 0.75))
 
 
 def test_tabulate_pays_nothing_in_terminal_states(toy_text):
@@ -133,10 +142,49 @@ def test_tabulate_agrees_with_the_steps_of_gymnasium(env_id):
     assert check.steps == 5000 and check.p_value > 1e-6
 
 
-@pytest.mark.parametrize("wrap", [lambda env: TransformReward(env, lambda reward: -reward), lambda env: TimeLimit(env, 1)])
+@pytest.mark.parametrize("wrap", [RecordEpisodeStatistics, lambda env: TimeLimit(env, 1)])
 def test_tabulate_looks_through_wrappers(wrap):
     plain, wrapped = table_of(TableEnv(coin(), [1, 0])), table_of(wrap(TableEnv(coin(), [1, 0])))
     assert (plain.mdp.P != wrapped.mdp.P).nnz == 0 and (plain.reward.values == wrapped.reward.values).all()
+
+
+def test_tabulate_refuses_a_wrapper_that_changes_the_environment_outside_its_table():
+    with pytest.raises(NotTabular, match="TransformReward changes the environment outside its table"):
+        table_of(TransformReward(TableEnv(coin(), [1, 0]), lambda reward: -reward))
+
+
+def test_tabulate_gives_the_reward_that_a_wrapper_pays():
+    learned = np.array([3.0, 5.0])
+    found = tabulate(TimeLimit(LearnedReward(TableEnv(coin(), [1, 0]), learned), 9), gamma=0.9)
+    np.testing.assert_allclose(found.reward.values, [[4.0], [0.0]])
+
+
+def test_tabulate_refuses_a_learned_reward_that_does_not_know_the_copies():
+    env = TableEnv(both_ways(), [1, 0, 0])
+    with pytest.raises(InvalidReward, match=r"has 3 states: expected 4"):
+        tabulate(LearnedReward(env, np.zeros(3)), gamma=0.9)
+
+
+@pytest.mark.parametrize("wrong", ["FrozenLake-v1", None])
+def test_tabulate_refuses_what_is_no_environment(wrong, unchecked):
+    with pytest.raises(InvalidParameter, match="expected an environment"):
+        tabulate(wrong, gamma=0.9)
+
+
+def test_tabulate_refuses_a_state_without_lines_where_episodes_come():
+    with pytest.raises(NotTabular, match=r"no line for \(s=0, a=0\)"):
+        table_of(TableEnv([[[]], [[(1.0, 1, 0.0, True)]]], [1, 0]))
+
+
+def test_tabulate_lets_terminal_states_be_without_lines():
+    found = table_of(TableEnv([[[(1.0, 1, 1.0, True)]], [[]]], [1, 0]))
+    assert found.mdp.terminal.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("start", [[1.0], [1.0, 0, 0]])
+def test_tabulate_refuses_a_start_of_another_length(start):
+    with pytest.raises(InvalidMDP, match="initial_state_distrib has shape"):
+        table_of(TableEnv(coin(), start, truth_start=[1, 0]))
 
 
 def test_tabulate_leaves_the_environment_as_it_was():

@@ -34,6 +34,11 @@ def coin(p: float = 0.5, win: float = 1.0, lose: float = 0.0, ends: bool = True)
     return [[[(p, 1, win, ends), (1 - p, 0, lose, False)]], [[(1.0, 1, 0.0, True)]]]
 
 
+def lottery(p: float) -> Table:
+    """State 0 always ends in state 1, and pays 1 with probability p: s, a and s' do not settle what is paid."""
+    return [[[(p, 1, 1.0, True), (1 - p, 1, 0.0, True)]], [[(1.0, 1, 0.0, True)]]]
+
+
 def both_ways() -> Table:
     """State 1 is entered by action 0 of state 0 without and by action 1 with an end; state 2 is the end otherwise."""
     end = [(1.0, 2, 0.0, True)]

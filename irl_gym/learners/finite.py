@@ -22,21 +22,22 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym.certificate import certify, least_per_state, row_margins
+from irl_gym.checks import checked_number
 from irl_gym.comparisons import Comparisons, compare
-from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverError, SolverFailed
+from irl_gym.errors import DegenerateExpert, InvalidMDP, InvalidParameter, SolverFailed, SolverInfeasible
 from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.programs import Program, RewardOn, Solved, Solving
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
-from irl_gym.solvers import SolverName, Status
+from irl_gym.solvers import SolverName, Status, check_solving
 
 JUST_BELOW = 1 - 1e-3
 """`l1="auto"` is lambda_0 times this."""
 NO_MARGIN = 1e-9
 """A margin below this, relative to R_max, is none: it is the solvers' rounding."""
 LARGEST_BOUND = 1e6
-"""Uniform margins below R_max over this are looked for among fewer states."""
+"""A margin below R_max over this is none: such a state is left out of the uniform margin."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,12 @@ class FiniteLP:
     """Seconds for each program; None for no limit."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.r_max < np.inf:
-            raise InvalidParameter(f"r_max is {self.r_max}: expected a bound above 0, such as 1.0.")
-        if (isinstance(self.l1, str) and self.l1 != "auto") or (not isinstance(self.l1, str) and not 0 <= self.l1 < np.inf):
-            raise InvalidParameter(f"l1 is {self.l1!r}: expected a number of at least 0, or 'auto'.")
-        cap = self.margin_cap
-        if (isinstance(cap, str) and cap != "auto") or (isinstance(cap, int | float) and not 0 < cap < np.inf):
-            raise InvalidParameter(f"margin_cap is {cap!r}: expected a number above 0, 'auto' or None.")
+        checked_number("r_max", self.r_max, "a bound above 0, such as 1.0", above=0)
+        if self.l1 != "auto":
+            checked_number("l1", self.l1, "a number of at least 0, or 'auto'", least=0)
+        if self.margin_cap is not None and self.margin_cap != "auto":
+            checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
+        check_solving(self.solver, self.time_limit)
         if self.reward_on not in ("state", "state-action"):
             raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
 
@@ -85,7 +85,9 @@ class FiniteLP:
             DegenerateExpert: (4) leaves no reward with a positive margin anywhere.
             SolverTimeout, SolverFailed: no answer.
         """
-        task = _Task(self, mdp, expert)
+        if not isinstance(mdp, TabularMDP):
+            raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
+        task, y_l1 = _Task(self, mdp, expert), None
         lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
         l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
         if self.margin_cap is None:
@@ -95,13 +97,12 @@ class FiniteLP:
             cap = task.cap() if self.margin_cap == "auto" else float(self.margin_cap)
             if self.margin_cap == "auto" and l1 == 0:
                 solved = programs.sparsest(task.program(), self.r_max, cap)
-                price = float(np.bincount(task.comparisons.states, np.maximum(solved.y, 0)).max())
-                task.stats["l1_limit"] = 1 / max(price, 1e-300)
-                y = np.zeros_like(solved.y)
+                task.stats["l1_limit"] = task.l1_limit(solved.y)
+                y, y_l1 = np.zeros_like(solved.y), solved.y
             else:
                 solved, y = (result := programs.ng_russell(task.program(), self.r_max, l1, cap)), result.y
         task.record("reward", solved)
-        result = task.result(solved, y, l1, lambda_0, cap)
+        result = task.result(solved, l1=l1, lambda_0=lambda_0, margin_cap=cap, y=y, y_l1=y_l1)
         if l1 == 0 and result.objective <= NO_MARGIN * min(self.r_max, cap or np.inf):
             raise task.degenerate()
         return result
@@ -152,6 +153,7 @@ class _Task:
             "seconds": answer.seconds,
             "iterations": answer.iterations,
             "attempts": answer.attempts,
+            "status": answer.status.value,
         }
 
     def lambda_0(self) -> float:
@@ -165,26 +167,32 @@ class _Task:
         """Half of the largest uniform margin; leaves in `counted` the rows of the states that can have one."""
         bound = self._uniform_bound()
         if bound is None:
-            served = programs.attainable(self.program())
+            served = programs.attainable(self.program(), LARGEST_BOUND)
             self.record("attainable", served)
             states = self._served(served)
+            self.stats["states_without_margin"] = np.unique(self.comparisons.states[self.counted]).size - states.size
             self.counted = self.counted & np.isin(self.comparisons.states, states)
             if not self.counted.any():
                 raise self.degenerate()
-            bound = self._uniform_bound()
+            bound = self._uniform_bound(3 * LARGEST_BOUND)  # each has a margin above 1/2 at the bound
             if bound is None:
-                raise SolverError("the states that can have a margin were found, but no uniform margin: report this table.")
+                raise SolverFailed("the states that can have a margin were found, but no uniform margin: report this table.")
         self.stats["uniform_margin"] = self.learner.r_max / bound
         return self.learner.r_max / bound / 2
 
-    def _uniform_bound(self) -> float | None:
-        """Least bound on |R| for margins of 1 in all counted states; None if there is none (the program is infeasible)."""
+    def _uniform_bound(self, largest: float = LARGEST_BOUND) -> float | None:
+        """Least bound on |R| for margins of 1 in all counted states; None if there is none, or only a larger one."""
         try:
             solved = programs.uniform_margin(self.program())
-        except SolverFailed:
+        except SolverInfeasible:
             return None
         self.record("uniform margin", solved)
-        return solved.answer.objective if 0 < solved.answer.objective < LARGEST_BOUND else None
+        return solved.answer.objective if 0 < solved.answer.objective < largest else None
+
+    def l1_limit(self, y: np.ndarray) -> float:
+        """An l1 below which the sparsest reward stays optimal: where no margin's price in ||R||_1, times l1, is above 1."""
+        prices = np.bincount(self.comparisons.states[self.counted], np.maximum(y[self.counted], 0))
+        return 1 / max(float(prices.max()), 1e-300)
 
     def _served(self, solved: Solved) -> np.ndarray:
         c = self.comparisons
@@ -214,15 +222,12 @@ class _Task:
             f"{self.rows.size} reachable states prefers its actions. Is the policy optimal for any reward at all?{mend}"
         )
 
-    def result(self, solved: Solved, y: np.ndarray, l1: float, lambda_0: float | None, cap: float | None) -> IRLResult:
+    def result(self, solved: Solved, **proof: Any) -> IRLResult:
         values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R
         reward = TabularReward(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
         counted = self.rows[np.unique(self.comparisons.states[self.counted])]
-        certificate = certify(
-            self.mdp, self.expert, reward,
-            r_max=self.learner.r_max, l1=l1, lambda_0=lambda_0, margin_cap=cap, counted=counted, y=y,
-        )  # fmt: skip
+        certificate = certify(self.mdp, self.expert, reward, r_max=self.learner.r_max, counted=counted, **proof)
         status = Status.ZERO if certificate.zero else solved.answer.status
         return IRLResult(reward, status, certificate.objective, certificate, self.stats)

@@ -157,21 +157,23 @@ def uniform_margin(program: Program) -> Solved:
     return program.solve(cp.Minimize(bound), 1.0)
 
 
-def attainable(program: Program) -> Solved:
-    """Which states can have a margin at all: maximise sum(t), 0 <= t <= 1, subject to (4) and R unbounded.
+def attainable(program: Program, bound: float) -> Solved:
+    """Which states can have a margin at all: maximise sum(t), 0 <= t <= 1, subject to (4) and |R| <= bound.
 
     Rewards that satisfy (4) form a cone and margins add up, so one reward serves every state that can be served, and scaling
-    brings each of those to t = 1. The reward returned has a margin of 1 in exactly these states.
+    brings each of those to t = 1. With a bound, a state counts as served when t > 1/2: margins below 1 / bound are none.
     """
     t = cp.Variable(program.n_margins, nonneg=True)
     program.constraints += [t <= 1]
+    program.bounded(bound)
     return program.solve(cp.Maximize(cp.sum(t)), t)
 
 
 def sparsest(program: Program, r_max: float, margin: float) -> Solved:
     """The reward of least ||R||_1 with margins of at least `margin`: the capped LP as l1 goes to 0.
 
-    Solved in units of `margin`, so the scale of the rows does not depend on it; duals are those of l1 / margin.
+    Solved in units of `margin`, so that the scale of the rows does not depend on it. The duals are prices of ||R||_1 for a
+    margin, in which that unit cancels.
     """
     program.bounded(r_max / margin)
     solved = program.solve(cp.Minimize(program.l1()), 1.0)

@@ -72,6 +72,16 @@ def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):
     assert made.returncode == 2 and "RunConflict" in made.stderr
 
 
+def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
+    process = subprocess.Popen(command("--out", "run", "--episodes", "10"), cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not (tmp_path / "run" / ".stages" / "reward.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130 and said.startswith("Stopped. The same command continues")
+
+
 def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
     arguments = ("--out", "run", "--episodes", "10", "--total-timesteps", "100000")
     process = subprocess.Popen(command(*arguments), cwd=tmp_path, stdout=subprocess.DEVNULL)

@@ -71,14 +71,15 @@ def row(name: str, asked: Arguments) -> list[str]:
     expert, random = float(table.mdp.d0 @ best.V), random_value(table.mdp, table.reward)
     result = FiniteLP(reward_on="state-action" if "(s, a)" in name else "state").fit(table.mdp, best.policy)
     regret = (expert - worst_tie(table.mdp, result.reward, table.reward).value) / (expert - random)
-    shaped, scaled = ExpectedAdvantage(result.certificate.margin_cap), float(np.abs(table.reward.values).max())
+    cap, scaled = float(result.certificate.margin_cap or np.nan), float(np.abs(table.reward.values).max())
+    shaped = ExpectedAdvantage(cap)
     rewards = {
         "learned, shaped": (shaped.apply(result.reward, table.mdp), FOR_ADVANTAGES),
         "learned": (result.reward, {}),
         "true, same settings": (table.reward, FOR_ADVANTAGES),
         "true, suited settings": (table.reward, {}),
         "true, shaped": (
-            ExpectedAdvantage(result.certificate.margin_cap * scaled).apply(table.reward, table.mdp),
+            ExpectedAdvantage(cap * scaled).apply(table.reward, table.mdp),
             FOR_ADVANTAGES,
         ),
     }

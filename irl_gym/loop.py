@@ -78,8 +78,16 @@ class Loop:
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""
+        makers = {
+            "expert": self._make_expert,
+            "demonstrations": self._make_demonstrations,
+            "reward": self._make_reward,
+            "agent": self._make_agent,
+            "metrics": self._make_metrics,
+            "figures": self._make_figures,
+        }
         self.report_progress(name, 0.0)
-        record = self.folder.run(name, getattr(self, f"_make_{name}"))
+        record = self.folder.run(name, makers[name])
         self.report_progress(name, 1.0)
         return record
 

@@ -25,12 +25,14 @@ KWARGS = {
     "CliffWalking": ("CliffWalking-v1", {}),
     "CliffWalking slippery": ("CliffWalkingSlippery-v1", {}),
     "Taxi": ("Taxi-v4", {}),
+    "GridWorld": ("irl_gym_envs:irl_gym/GridWorld-v0", {}),
+    "FourRooms": ("irl_gym_envs:irl_gym/FourRooms-v0", {}),
 }
 
 
 @pytest.fixture(scope="session")
 def toy_text():
-    """Tables of Gymnasium's environments with gamma 0.99, by the names of references.md; each made once, unchecked."""
+    """Tables of Gymnasium's environments and ours with gamma 0.99, by the names of references.md; each made once, unchecked."""
     from irl_gym.tabulate import tabulate  # here, so that the filter of pytest_configure is in force
 
     made = {}

@@ -73,6 +73,21 @@ def test_the_spec_of_a_wrapped_environment_makes_it_again(tmp_path):
     assert walk(again) == walk(env)
 
 
+def test_the_spec_of_a_wrapped_environment_makes_it_again_with_a_reward_in_memory():
+    env = LearnedReward(gym.make("FrozenLake-v1"), REWARD)
+    assert walk(gym.make(env.spec)) == walk(env)
+
+
+def test_an_array_is_a_reward():
+    env = LearnedReward(gym.make("FrozenLake-v1"), REWARD.values)
+    assert walk(env) == walk(LearnedReward(gym.make("FrozenLake-v1"), REWARD))
+
+
+def test_a_reward_for_another_number_of_actions_is_refused():
+    with pytest.raises(InvalidReward, match="2 actions"):
+        LearnedReward(gym.make("FrozenLake-v1"), np.zeros((16, 2)))
+
+
 def test_an_observation_outside_the_index_is_refused():
     states = StateIndex(spaces.Discrete(16), codes=np.array([0, 1, 5]))
     env = LearnedReward(gym.make("FrozenLake-v1", is_slippery=False), TabularReward(np.zeros(3)), states)

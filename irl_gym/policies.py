@@ -7,7 +7,7 @@ Three ways to write a tabular policy, and everything that takes one takes all th
 Axes: S states, A actions.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -101,6 +101,7 @@ class TabularPolicy:
     """Turns observations into rows."""
     seed: int = 0
     """Of the generator that `predict(deterministic=False)` draws from."""
+    _rng: np.random.Generator = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if np.ndim(self.probabilities) != 2:
@@ -130,6 +131,6 @@ class TabularPolicy:
         if deterministic:
             actions = p.argmax(axis=1)
         else:
-            draws = self._rng.random((rows.size, 1))  # pyright: ignore[reportAttributeAccessIssue]
+            draws = self._rng.random((rows.size, 1))
             actions = np.minimum((draws >= p.cumsum(axis=1)).sum(axis=1), p.shape[1] - 1)
         return (actions if batched else np.int64(actions[0])), state

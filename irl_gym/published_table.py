@@ -17,7 +17,7 @@ from gymnasium import spaces
 
 from irl_gym._typing import Sparse
 from irl_gym.checks import float_array
-from irl_gym.errors import InvalidMDP, NotTabular
+from irl_gym.errors import InvalidMDP, NotDiscrete, NotTabular
 from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.rewards import TabularReward
 from irl_gym.selfcheck import Payments
@@ -36,6 +36,8 @@ def published_table(env: gym.Env, gamma: float) -> Tabulation | None:
             f"P is published, but the observation space is {base.observation_space}: expected Discrete, so that "
             "observations are the rows of P."
         )
+    if not isinstance(base.action_space, spaces.Discrete):
+        raise NotDiscrete(f"P is published, but the action space is {base.action_space}: expected Discrete.")
     if getattr(base, "fickle_passenger", False):
         raise NotTabular(
             "fickle_passenger=True: the passenger changes destination outside the table that Taxi publishes, and depends on "
@@ -50,7 +52,7 @@ def published_table(env: gym.Env, gamma: float) -> Tabulation | None:
     d0 = float_array("initial_state_distrib", start, "(S,) probabilities", InvalidMDP)
     if d0.shape != (int(space.n),):
         raise InvalidMDP(f"initial_state_distrib has shape {d0.shape}: expected ({int(space.n)},), one for each observation.")
-    return _assemble(_entries(P, space, actions), d0, space, gamma)  # pyright: ignore
+    return _assemble(_entries(P, space, actions), d0, space, gamma)
 
 
 @dataclass(frozen=True, eq=False)

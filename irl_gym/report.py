@@ -57,6 +57,9 @@ def _reward(report: Report) -> Table:
     if reward["least_l1_norm"] is not None:
         above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
         table.add_row("||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins")
+    if reward["marginless_states"]:
+        mend = " Try --margin-cap auto." if cap is None else ""
+        table.add_row("states where it leaves ties", f"{reward['marginless_states']}: the expert has no margin there.{mend}")
     if reward["inseparable_states"]:
         table.add_row(
             "states it cannot settle",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import cvxpy as cp
+import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
@@ -106,7 +107,7 @@ def solve(problem: cp.Problem, *, rows: int, solver: SolverName = "auto", time_l
             status = Status.OPTIMAL if problem.status == cp.OPTIMAL else Status.INACCURATE
             stats = problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats is not None else 0
-            return Answer(status, name, time.perf_counter() - start, float(problem.value), iterations, attempt)  # pyright: ignore
+            return Answer(status, name, time.perf_counter() - start, float(np.asarray(problem.value)), iterations, attempt)
         if problem.status == cp.INFEASIBLE:
             raise SolverInfeasible(f"{name} finds that the constraints contradict each other: no reward satisfies them.")
         failures.append(f"{name}: {failure}")

@@ -145,8 +145,6 @@ def test_an_environment_that_cannot_be_used_is_refused_before_anything_is_writte
 
 
 def test_an_expert_that_no_reward_explains_stops_the_run_with_its_reason(tmp_path):
-    from irl_gym_envs.grid_world import GridWorldEnv  # noqa: F401  (registers)
-
     corridor = {"size": [1, 2], "slip": 1.0, "goals": [[0, 1]], "start": [0, 0], "terminal_goal": False}
     asked = Experiment("irl_gym_envs:irl_gym/GridWorld-v0", 0.9, env_kwargs=corridor, episodes=1)
     with pytest.raises(DegenerateExpert, match="state-action"):

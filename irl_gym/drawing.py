@@ -117,6 +117,10 @@ def triangles(axis: Axes, layout: GridLayout, R: np.ndarray) -> str:
             axis.text(spot[0], spot[1], written(value), ha="center", va="center", color=ink, fontsize=_size(layout, 0.13))
     axis.figure.colorbar(mappable, ax=axis, label="reward of a step", shrink=0.85, aspect=25, pad=0.02)
     _letters(axis, layout, colours, centred=~shown, only=~shown)
+    for row, column in np.argwhere(shown & (layout.letters != "")):  # where the triangles meet
+        patch = {"boxstyle": "circle,pad=0.2", "facecolor": "white", "edgecolor": "none"}
+        letter, size = str(layout.letters[row, column]), _size(layout, 0.13)
+        axis.text(column, row, letter, ha="center", va="center", weight="bold", fontsize=size, bbox=patch)
     return "one triangle for each move"
 
 

@@ -21,7 +21,8 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward, as_reward
 
 OPTIMAL_WITHIN = 1e-8
-"""What a solver's feasibility leaves, relative to max |R|; a margin below it is none, and a violation below it is none."""
+"""What solvers' feasibility leaves of (4). A violation below this, times max |R| and a tenth of 1 / (1 - gamma), is none; nor
+is such a margin one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +176,7 @@ def certify(
     values = row_margins(part, comparisons, R, discounted)
     usable = _comparable(comparisons, R)
     least = least_per_state(values[usable], comparisons.states[usable], part.n_states)
-    rounding = float(np.abs(R.values).max()) * (OPTIMAL_WITHIN + 1e-12 / (1 - mdp.gamma))
+    rounding = OPTIMAL_WITHIN * float(np.abs(R.values).max()) * (1 + 0.1 / (1 - mdp.gamma))
     if y is not None:  # a trivial row bounds no margin, so its dual may not tighten D(y)
         y = np.where(usable | comparisons.equal, y, 0.0)
     violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))

@@ -16,6 +16,7 @@ def checked_number(
     above: float | None = None,
     least: float | None = None,
     below: float | None = None,
+    whole: bool = False,
     error: type[InvalidInput] = InvalidParameter,
 ) -> float:
     """Return a finite number within a range, as a float.
@@ -27,12 +28,14 @@ def checked_number(
         above: it has to be greater than this.
         least: or at least this.
         below: and less than this.
+        whole: only integers, NumPy's among them.
         error: raised when it is not.
 
     Raises:
         InvalidInput: of the class given.
     """
-    number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else np.nan
+    kind = numbers.Integral if whole else numbers.Real
+    number = float(value) if isinstance(value, kind) and not isinstance(value, bool) else np.nan
     fine = np.isfinite(number) and (above is None or number > above) and (least is None or number >= least)
     if not (fine and (below is None or number < below)):
         raise error(f"{name} is {value!r}: expected {expected}.")

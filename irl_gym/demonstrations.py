@@ -144,7 +144,7 @@ def _stepped(
 def _check_count(n_episodes: int, max_episode_steps: int | None) -> None:
     for name, value in (("n_episodes", n_episodes), ("max_episode_steps", max_episode_steps)):
         if value is not None:
-            checked_number(name, value, "a whole number of at least 1", least=1)
+            checked_number(name, value, "a whole number of at least 1", least=1, whole=True)
 
 
 def collect_from_table(

@@ -204,9 +204,12 @@ def policy_iteration(
 
     Raises:
         InvalidReward: wrong shape or not finite.
-        InvalidParameter: an empty row of `allowed`, or `max_iterations` spent.
+        InvalidParameter: `allowed` of another shape or with an empty row, a negative tolerance, or `max_iterations` spent.
     """
     R = checked_reward(mdp, R)
+    tolerance = checked_number("tolerance", tolerance, "a number of at least 0, relative to max |V|", least=0)
+    if allowed is not None and np.shape(allowed) != R.shape:
+        raise InvalidParameter(f"allowed has shape {np.shape(allowed)}: expected {R.shape}, a set of actions for each state.")
     blocked = np.zeros(R.shape, dtype=bool) if allowed is None else ~np.asarray(allowed, dtype=bool)
     empty = np.flatnonzero(blocked.all(axis=1))
     if empty.size:

@@ -13,6 +13,7 @@ from irl_gym.learners.base import Learner
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import check_discount
 from irl_gym.planners import FOR_ADVANTAGES, SB3, Planner, ValueIteration
+from irl_gym.rewards import plain_json
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,11 @@ class Experiment:
     def __post_init__(self) -> None:
         check_discount(self.gamma)
         for name in ("episodes", "num_envs", "eval_episodes"):
-            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1)
-        checked_number("seed", self.seed, "a whole number from 0 to 2^32 - 1, as Stable-Baselines3 takes", least=0, below=2**32)
+            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
+        expected = "a whole number from 0 to 2^32 - 1, as Stable-Baselines3 takes"
+        checked_number("seed", self.seed, expected, least=0, below=2**32, whole=True)
+        for name in ("episodes", "num_envs", "eval_episodes", "seed"):
+            object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
 
     @property
     def name(self) -> str:
@@ -65,7 +69,7 @@ class Experiment:
         for name, value in plain.items():
             if is_dataclass(value) and not isinstance(value, type):
                 plain[name] = {"type": type(value).__name__, **asdict(value)}
-        return plain
+        return json.loads(json.dumps(plain, default=plain_json))
 
 
 def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:

@@ -162,7 +162,7 @@ class SB3:
     def __post_init__(self) -> None:
         _algorithm(self.algorithm)
         for name in ("total_timesteps", "threads"):
-            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1)
+            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
 
     def plan(
         self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0
@@ -178,7 +178,7 @@ class SB3:
         """
         settings = self._settings(env)
         with _torch_threads(self.threads):
-            model = self._model(env, gamma=check_discount(gamma), seed=seed, device="cpu", **settings)
+            model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
             agent = Agent(model)
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
             model.learn(self.total_timesteps, callback=callback)

@@ -97,7 +97,7 @@ class TabularReward:
         """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
         path = Path(path)
         beside = path.with_name(f".{path.name}.tmp.npz")
-        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True, default=_plain)
+        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True, default=plain_json)
         np.savez(beside, values=self.values, header=np.array(header))
         beside.replace(path)
 
@@ -139,6 +139,6 @@ def as_reward(reward: Any) -> TabularReward:
     return reward if isinstance(reward, TabularReward) else TabularReward(np.asarray(reward))
 
 
-def _plain(value: Any) -> Any:
+def plain_json(value: Any) -> Any:
     """NumPy's numbers and arrays as json has them."""
     return value.tolist() if hasattr(value, "tolist") else str(value)

@@ -39,8 +39,8 @@ def read_json(path: Path) -> dict[str, Any]:
         ValueError: it is something else.
     """
     content = json.loads(path.read_text())
-    if not isinstance(content, dict):
-        raise ValueError(f"expected an object, found a {type(content).__name__}")
+    if not isinstance(content, dict) or not content:
+        raise ValueError(f"expected an object with something in it, found {content!r:.40}")
     return content
 
 
@@ -160,9 +160,8 @@ class RunFolder:
         beside.mkdir()
         start = time.perf_counter()
         record = {**make(beside), "seconds": time.perf_counter() - start}
-        files = sorted(beside.iterdir())
-        record["files"] = [made.name for made in files]
-        for made in files:
+        record["files"] = sorted(one.relative_to(beside).as_posix() for one in beside.rglob("*") if one.is_file())
+        for made in sorted(beside.iterdir()):
             final = self.path / made.name
             if final.is_dir():
                 shutil.rmtree(final)

@@ -15,6 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
+from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.mdp import TransitionTable
 from irl_gym.rewards import TabularReward, as_reward
@@ -51,8 +52,8 @@ class TabularVecEnv(VecEnv):
         reward = as_reward(reward)
         reward.expected(table)  # checks the shape
         for name, value in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
-            if value is not None and value < 1:
-                raise InvalidParameter(f"{name} is {value}: expected at least 1.")
+            if value is not None:
+                checked_number(name, value, "a whole number of at least 1", least=1, whole=True)
         if states is not None and states.n_states != table.n_states:
             raise InvalidParameter(f"the state index has {states.n_states} states: expected {table.n_states}, the table's.")
         self.table, self.reward, self.max_episode_steps, self.states = table, reward, max_episode_steps, states

@@ -14,6 +14,7 @@ from typing import Any
 import gymnasium as gym
 from gymnasium import spaces
 
+from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
 from irl_gym.mdp import check_discount
 from irl_gym.published_table import published_table
@@ -26,6 +27,12 @@ from irl_gym.wrappers import LearnedReward
 
 OWN_ENVIRONMENTS = ("irl_gym_envs:irl_gym/GridWorld-v0", "irl_gym_envs:irl_gym/FourRooms-v0")
 """Offered by name to who mistypes them; importing their module is what registers them."""
+
+WATCHING = frozenset({
+    "TimeLimit", "OrderEnforcing", "PassiveEnvChecker", "RecordEpisodeStatistics", "RecordVideo", "HumanRendering",
+    "RenderCollection", "Autoreset", "Monitor", "DataCollector",
+})  # fmt: skip
+"""Wrappers of Gymnasium, SB3 and Minari that only watch or limit; by name, since importing some needs packages of their own."""
 
 Source = Callable[[gym.Env, float], Tabulation | None]
 
@@ -49,8 +56,8 @@ def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int
     check_discount(gamma)
     if not isinstance(env, gym.Env):
         raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment, such as gymnasium.make gives.")
-    if check_steps < 0 or check_steps != int(check_steps):
-        raise InvalidParameter(f"check_steps is {check_steps}: expected a whole number of at least 0.")
+    for name, value in (("check_steps", check_steps), ("seed", seed)):
+        checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
     learned = _learned_reward(env)
     if not isinstance(env.action_space, spaces.Discrete):
         raise NotDiscrete(
@@ -69,7 +76,7 @@ def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int
         )
     if not check_steps:
         return found if learned is None else _with_reward(found, learned)
-    check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=check_steps, seed=seed)
+    check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
     found = replace(found, evidence=replace(found.evidence, check=check))
     return found if learned is None else _with_reward(found, learned)
 
@@ -116,13 +123,20 @@ def _learned_reward(env: gym.Env) -> LearnedReward | None:
     while isinstance(wrapper, gym.Wrapper):
         if isinstance(wrapper, LearnedReward):
             learned = learned or wrapper
-        elif isinstance(wrapper, gym.ObservationWrapper | gym.ActionWrapper | gym.RewardWrapper):
+        elif not _only_watches(wrapper):
             raise NotTabular(
                 f"the wrapper {type(wrapper).__name__} changes the environment outside its table: expected wrappers that only "
                 "watch or limit it. Tabulate `env.unwrapped`, or give the environment that change itself."
             )
         wrapper = wrapper.env
     return learned
+
+
+def _only_watches(wrapper: gym.Wrapper) -> bool:
+    """Does this wrapper leave observations, actions and rewards as they are? It steps as its base does, or it is known."""
+    kind = type(wrapper)
+    same = kind.step is gym.Wrapper.step and kind.reset is gym.Wrapper.reset
+    return same or kind.__name__ in WATCHING
 
 
 def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:

@@ -5,6 +5,7 @@
 Each measurement runs in a process of its own, for its peak memory. Ratios are of one run.
 """
 
+import argparse
 import multiprocessing
 import resource
 import subprocess
@@ -111,6 +112,7 @@ MEASUREMENTS: list[tuple[str, str, Callable[..., str], tuple, dict]] = [
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     shown = Table("what", "bar", "measured")
     for name, bar, measure, arguments, settings in MEASUREMENTS:
         with multiprocessing.get_context("spawn").Pool(1) as pool:

@@ -1,7 +1,8 @@
 """Recover a reward from an expert by linear-programming IRL, retrain an agent on it, and say how good the agent is.
 
-python scripts/recover_and_retrain.py --env-id Taxi-v4
-python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 is_slippery=true
+For example:
+    python scripts/recover_and_retrain.py --env-id Taxi-v4
+    python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 is_slippery=true
 """
 
 import sys

@@ -254,3 +254,10 @@ def test_policy_iteration_does_not_depend_on_the_scale_of_the_reward(factor):
     model = models.random_model(1)
     R = model.step_reward
     assert np.array_equal(policy_iteration(model.mdp, R).policy, policy_iteration(model.mdp, factor * R).policy)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance": float("nan")}, {"tolerance": -1.0}, {"allowed": np.ones((3, 4), dtype=bool)}])
+def test_policy_iteration_refuses(wrong, unchecked):
+    model = models.random_model(0)
+    with pytest.raises(InvalidParameter, match=next(iter(wrong))):
+        policy_iteration(model.mdp, model.step_reward, **wrong)

@@ -1,5 +1,6 @@
 """Arguments of environments, as text."""
 
+import numpy as np
 import pytest
 
 from irl_gym.errors import InvalidDiscount, InvalidParameter
@@ -47,3 +48,13 @@ def test_a_seed_that_sb3_does_not_take_is_refused(seed):
 def test_a_discount_outside_the_interval_is_refused():
     with pytest.raises(InvalidDiscount, match="gamma is 1"):
         Experiment("FrozenLake-v1", 1.0)
+
+
+@pytest.mark.parametrize("wrong", [{"episodes": 1.5}, {"seed": 0.5}, {"num_envs": 2.5}, {"eval_episodes": True}])
+def test_counts_that_are_not_whole_are_refused(wrong, unchecked):
+    with pytest.raises(InvalidParameter, match="a whole number"):
+        lake(**wrong)
+
+
+def test_numpys_numbers_name_the_same_experiment(unchecked):
+    assert lake(seed=np.int64(3), episodes=np.int32(7)).name == lake(seed=3, episodes=7).name

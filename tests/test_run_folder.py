@@ -5,7 +5,7 @@ import json
 import pytest
 
 from irl_gym.errors import RunConflict
-from irl_gym.run_folder import RunFolder
+from irl_gym.run_folder import RunFolder, read_json
 
 CONFIG = {"env_id": "A-v0", "seed": 1}
 
@@ -131,3 +131,17 @@ def test_two_at_once_in_one_folder_are_refused(folder):
 
     with pytest.raises(RunConflict, match="another process"):
         folder.run("one", second)
+
+
+def test_a_stage_whose_file_in_a_folder_was_deleted_is_run_again(folder):
+    folder.run("one", writing("x"))
+    (folder.path / "deep" / "b.txt").unlink()
+    folder.run("one", writing("y"))
+    assert (folder.path / "deep" / "b.txt").read_text() == "y"
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", "null", ""])
+def test_read_json_refuses_what_is_no_object(folder, content):
+    (folder.path / "metrics.json").write_text(content)
+    with pytest.raises(RunConflict, match=r"metrics\.json cannot be read"):
+        folder.load("metrics.json", read_json)

@@ -2,7 +2,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
-from gymnasium.wrappers import RecordEpisodeStatistics, TimeLimit, TransformReward
+from gymnasium.wrappers import NormalizeReward, RecordEpisodeStatistics, RepeatAction, TimeLimit, TransformReward
 from tiny_env import TableEnv, both_ways, coin
 
 from irl_gym.dynamic_programming import policy_iteration
@@ -148,9 +148,30 @@ def test_tabulate_looks_through_wrappers(wrap):
     assert (plain.mdp.P != wrapped.mdp.P).nnz == 0 and (plain.reward.values == wrapped.reward.values).all()
 
 
-def test_tabulate_refuses_a_wrapper_that_changes_the_environment_outside_its_table():
-    with pytest.raises(NotTabular, match="TransformReward changes the environment outside its table"):
-        table_of(TransformReward(TableEnv(coin(), [1, 0]), lambda reward: -reward))
+class Negated(gym.Wrapper):
+    def step(self, action):
+        observation, reward, *rest = super().step(action)
+        return observation, -reward, *rest
+
+
+@pytest.mark.parametrize(
+    "wrap",
+    [lambda env: TransformReward(env, lambda reward: -reward), NormalizeReward, lambda env: RepeatAction(env, 2), Negated],
+    ids=["TransformReward", "NormalizeReward", "RepeatAction", "Negated"],
+)
+def test_tabulate_refuses_a_wrapper_that_changes_the_environment_outside_its_table(wrap):
+    with pytest.raises(NotTabular, match="changes the environment outside its table"):
+        table_of(wrap(TableEnv(coin(), [1, 0])))
+
+
+@pytest.mark.parametrize("steps", [-1, 1.5, float("nan"), "10"])
+def test_tabulate_refuses_a_number_of_steps_that_is_none(steps, unchecked):
+    with pytest.raises(InvalidParameter, match="check_steps is"):
+        tabulate(TableEnv(coin(), [1, 0]), gamma=0.9, check_steps=steps)
+
+
+def test_tabulate_takes_a_seed_of_numpy(unchecked):
+    assert tabulate(TableEnv(coin(), [1, 0]), gamma=0.9, seed=np.int64(3)).evidence.check is not None
 
 
 def test_tabulate_gives_the_reward_that_a_wrapper_pays():

@@ -70,7 +70,9 @@ class Program:
             self.margins = comparisons.rows @ V  # (4)
         else:
             self.R = cp.Variable(mdp.n_states * mdp.n_actions)
-            self.constraints += [closing @ V == mdp.mixing(comparisons.distribution) @ self.R]  # (5) on steps
+            unit = 1 / (1 - mdp.gamma)  # weighs (5), so that its residual is not multiplied by this in V
+            here_R = sp.csr_array(unit * mdp.mixing(comparisons.distribution))
+            self.constraints += [sp.csr_array(unit * closing) @ V == here_R @ self.R]  # (5) on steps
             stacked = comparisons.states * mdp.n_actions + comparisons.actions
             here = _selection(comparisons.states, mdp.n_states)
             pair = _selection(stacked, mdp.n_states * mdp.n_actions)
@@ -125,15 +127,19 @@ def _selection(columns: np.ndarray, width: int) -> sp.csr_array:
 
 
 def ng_russell(program: Program, r_max: float, l1: float, cap: float | None) -> Solved:
-    """The LP of section 3.2: maximise sum(t) - l1 ||R||_1, 0 <= t (<= cap), subject to (4) and |R| <= R_max."""
+    """The LP of section 3.2: maximise sum(t) - l1 ||R||_1, 0 <= t (<= cap), subject to (4) and |R| <= R_max.
+
+    Solved in units of R_max, in which it is homogeneous; the duals are the same.
+    """
     t = cp.Variable(program.n_margins, nonneg=True)
     objective = cp.sum(t)
     if l1 > 0:
         objective = objective - l1 * program.l1()
     if cap is not None:
-        program.constraints += [t <= cap]
-    program.bounded(r_max)
-    return program.solve(cp.Maximize(objective), t)
+        program.constraints += [t <= cap / r_max]
+    program.bounded(1.0)
+    solved = program.solve(cp.Maximize(objective), t)
+    return Solved(np.clip(solved.R, -1.0, 1.0) * r_max, solved.y, solved.answer)
 
 
 def critical_l1(program: Program) -> Solved:

@@ -76,3 +76,16 @@ def test_an_unknown_solver_is_refused_at_once(unchecked):
 def test_a_tabulation_in_place_of_its_mdp_is_refused(toy_text, unchecked):
     with pytest.raises(InvalidMDP, match="mdp is a Tabulation"):
         FiniteLP().fit(toy_text("FrozenLake 4x4"), np.zeros(16, dtype=int))
+
+
+@pytest.mark.parametrize("solver", ["highs", "clarabel"])
+@pytest.mark.parametrize("r_max", [1e-4, 1.0, 100.0])
+@pytest.mark.parametrize("settings", [{"margin_cap": None}, {"margin_cap": None, "l1": "auto"}, {"reward_on": "state-action"}])
+def test_the_expert_is_optimal_whatever_the_scale_and_the_discount(solver, r_max, settings):
+    for seed in range(4):
+        model = models.random_model(seed, S=8, kind="sparse", gamma=0.999)
+        if "margin_cap" in settings:
+            settings = {**settings, "reward_on": "state-action"}
+        found = FiniteLP(r_max=r_max, solver=solver, **settings).fit(model.mdp, model.expert)
+        assert found.certificate.expert_optimal, found.certificate.worst_violation / r_max
+        assert np.abs(found.reward.values).max() <= r_max * (1 + 1e-12)

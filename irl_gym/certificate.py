@@ -217,7 +217,7 @@ def _objective_states(
     if cap is None:
         states = np.setdiff1d(states, comparisons.states[~usable & ~comparisons.equal])
     if counted is not None:
-        states = np.intersect1d(states, np.searchsorted(rows, counted))
+        states = np.intersect1d(states, np.flatnonzero(np.isin(rows, counted)))
     return states
 
 
@@ -235,12 +235,13 @@ class _Dual:
     cap: float | None
 
     def bound(self, y: np.ndarray | None) -> float:
-        """The least D(y) over the sign of the equalities' duals, which solvers leave open."""
-        if y is None:
-            return float("nan")
+        """The least D(y)."""
+        return float("nan") if y is None else min(map(self.at, self._signed(y)))
+
+    def _signed(self, y: np.ndarray) -> list[np.ndarray]:
+        """Y >= 0 on the inequalities, with either sign on the equalities, whose sign solvers leave open."""
         equal, positive = self.comparisons.equal, np.maximum(y, 0.0)
-        signs = (1.0, -1.0) if equal.any() else (1.0,)
-        return min(self.at(np.where(equal, sign * y, positive)) for sign in signs)
+        return [np.where(equal, sign * y, positive) for sign in ((1.0, -1.0) if equal.any() else (1.0,))]
 
     def at(self, y: np.ndarray) -> float:
         """D(y), for y >= 0 on the inequalities."""
@@ -257,8 +258,7 @@ class _Dual:
             return float("nan")
         counted = np.isin(self.comparisons.states, self.objective_states) & ~self.comparisons.equal
         bounds = []
-        for sign in (1.0, -1.0):
-            signed = np.where(self.comparisons.equal, sign * y, np.maximum(y, 0.0))
+        for signed in self._signed(y):
             beyond = np.maximum(np.abs(self.gradient(signed)) - 1, 0.0).sum()
             bounds.append(self.cap * float(signed[counted].sum()) - self.r_max * float(beyond))
         return max(bounds)

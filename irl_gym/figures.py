@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from irl_gym.loop import Loop
 
 
-def draw(loop: "Loop", folder: Path) -> list[str]:
-    """Draw rewards, values, policies and the learning curve as PNG; return the files' names."""
+def draw(loop: "Loop", folder: Path) -> None:
+    """Draw rewards, values, policies and the learning curve as PNG."""
     mdp, true, learned = loop.table.mdp, loop.table.reward, loop.learned
     layout = grid_layout(loop.env, mdp)
     values = [evaluate_policy(mdp, reward.expected(mdp), loop.expert_actions) for reward in (true, learned)]
@@ -34,4 +34,3 @@ def draw(loop: "Loop", folder: Path) -> list[str]:
     }
     for name, figure in pictures.items():
         plotting.save_figure(figure, folder / name)
-    return sorted(pictures)

@@ -25,7 +25,7 @@ from irl_gym import figures, metrics
 from irl_gym._typing import Actions, ActionSets
 from irl_gym.datasets import write_minari
 from irl_gym.demonstrations import Episode, collect, collect_from_table
-from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
 from irl_gym.planners import Agent, Planner, tabular_actions
@@ -112,10 +112,11 @@ class Loop:
     def optimal_set(self) -> ActionSets:
         """(S, A) the expert's optimal set: all optimal actions if it is optimal, else the actions it takes."""
         mdp, reward = self.table.mdp, self.table.reward
-        best = policy_iteration(mdp, reward.values)
+        best = policy_iteration(mdp, reward)
         value = self.true_value(self.expert_actions)
-        if value >= float(mdp.d0 @ best.V) - metrics.TIE_TOLERANCE * float(np.abs(reward.values).max()):
-            return metrics.optimal_actions(mdp, reward)
+        tolerance = metrics.TIE_TOLERANCE * float(np.abs(reward.values).max())
+        if value >= float(mdp.d0 @ best.V) - tolerance:
+            return tied(best.Q, tolerance)
         return support(self.expert_actions, mdp.n_states, mdp.n_actions)
 
     def _train(self, planner: Planner, reward: TabularReward, progress: Callable[[int, Policy], None] | None) -> Policy:
@@ -223,7 +224,8 @@ class Loop:
     def _make_figures(self, folder: Path) -> dict[str, Any]:
         made = folder / "figures"
         made.mkdir()
-        return {"files": figures.draw(self, made)}
+        figures.draw(self, made)
+        return {}
 
 
 def _load_actions(path: Path) -> np.ndarray:

@@ -21,8 +21,8 @@ from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.states import StateIndex
 
 LEAST_P_VALUE = 1e-9
-"""Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are expected: a
-right table fails about 3 checks in a million."""
+"""Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are
+expected, so that a right table fails more often than this, if still hardly ever."""
 
 
 @dataclass(frozen=True, eq=False)

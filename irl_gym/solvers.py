@@ -1,7 +1,8 @@
 """Linear programs to answers: the only module that knows solver names.
 
 HiGHS (simplex) answers small programs with a vertex, exact to rounding; Clarabel (interior point) is the faster on large
-sparse ones: 2,500 states take HiGHS 12-20 s and Clarabel half a second. When one fails the other is tried once.
+sparse ones: Ng & Russell's program on a 50x50 grid (gamma 0.99) took HiGHS 9.8 s and Clarabel 0.4 s. Clarabel factorises by
+qdldl: its own choice, faer, took six times as long on a 100x100 grid. When one solver fails the other is tried once.
 """
 
 import enum

@@ -74,10 +74,9 @@ def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int
             "(probability, successor, reward, terminated). Give the environment such a `P`, or build a TabularMDP yourself "
             "and use TabularEnv."
         )
-    if not check_steps:
-        return found if learned is None else _with_reward(found, learned)
-    check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
-    found = replace(found, evidence=replace(found.evidence, check=check))
+    if check_steps:
+        check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
+        found = replace(found, evidence=replace(found.evidence, check=check))
     return found if learned is None else _with_reward(found, learned)
 
 

@@ -25,7 +25,7 @@ from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetExists, DatasetMismatch, InvalidDemonstrations, InvalidParameter, NotDiscrete
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 _ROOT = "MINARI_DATASETS_PATH"
 
@@ -130,7 +130,7 @@ def _buffer(episode: Episode, first_action: int) -> EpisodeBuffer:
 def read_minari(
     dataset: minari.MinariDataset | str,
     *,
-    states: StateIndex | None = None,
+    states: States | None = None,
     env: gym.Env | None = None,
     root: str | os.PathLike | None = None,
 ) -> Iterator[Episode]:

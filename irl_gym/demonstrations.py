@@ -17,7 +17,7 @@ from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.mdp import TransitionTable, check_discount
 from irl_gym.policies import Policy, as_distribution
 from irl_gym.sampling import Successors
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Episode:
         """Undiscounted return."""
         return float(np.sum(self.rewards))
 
-    def rows(self, states: StateIndex) -> np.ndarray:
+    def rows(self, states: States) -> np.ndarray:
         """(T+1,) the states visited.
 
         Raises:
@@ -150,7 +150,7 @@ def _check_count(n_episodes: int, max_episode_steps: int | None) -> None:
 def collect_from_table(
     table: TransitionTable,
     entry_rewards: np.ndarray,
-    states: StateIndex,
+    states: States,
     policy: Any,
     n_episodes: int,
     *,
@@ -178,7 +178,7 @@ def collect_from_table(
 
 
 def _drawn(
-    table: TransitionTable, paid: np.ndarray, states: StateIndex, policy: Matrix, n_episodes: int, seed: int, most: int
+    table: TransitionTable, paid: np.ndarray, states: States, policy: Matrix, n_episodes: int, seed: int, most: int
 ) -> Iterator[Episode]:
     rng = np.random.default_rng(seed)
     cumulated = policy.cumsum(axis=1)
@@ -224,7 +224,7 @@ class EmpiricalPolicy:
         return np.divide(self.counts, total, out=np.full(self.counts.shape, np.nan), where=total > 0)
 
 
-def empirical_policy(episodes: Iterable[Episode], states: StateIndex, n_actions: int) -> EmpiricalPolicy:
+def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int) -> EmpiricalPolicy:
     """Count the actions taken in each state.
 
     Raises:
@@ -245,7 +245,7 @@ def empirical_policy(episodes: Iterable[Episode], states: StateIndex, n_actions:
     return EmpiricalPolicy(counts)
 
 
-def feature_expectations(episodes: Iterable[Episode], features: np.ndarray, states: StateIndex, gamma: float) -> np.ndarray:
+def feature_expectations(episodes: Iterable[Episode], features: np.ndarray, states: States, gamma: float) -> np.ndarray:
     """(K,) mean over episodes of sum_t gamma^t phi(s_t), starting with phi(s_0): equation (11) of Ng & Russell.
 
     Args:

@@ -29,7 +29,7 @@ from irl_gym.dynamic_programming import value_iteration
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
-from irl_gym.states import StateIndex
+from irl_gym.states import StateIndex, States
 from irl_gym.tabular_vec_env import TabularVecEnv
 from irl_gym.tabulate import tabulate
 
@@ -236,7 +236,7 @@ def _torch_threads(threads: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def tabular_actions(policy: Policy, states: StateIndex) -> Actions:
+def tabular_actions(policy: Policy, states: States) -> Actions:
     """(S,) the action that a policy takes, deterministically, in each state."""
     actions, _ = policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)
     return np.asarray(actions).astype(np.int64)

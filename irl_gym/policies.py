@@ -14,7 +14,7 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
 from irl_gym.errors import InvalidPolicy
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 
 @runtime_checkable
@@ -97,7 +97,7 @@ class TabularPolicy:
 
     probabilities: Matrix
     """(S, A), rows sum to 1."""
-    states: StateIndex
+    states: States
     """Turns observations into rows."""
     seed: int = 0
     """Of the generator that `predict(deterministic=False)` draws from."""

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from irl_gym._typing import Matrix
 from irl_gym.errors import NotTabular, TableMismatch
 from irl_gym.mdp import TabularMDP, entry_positions
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 LEAST_P_VALUE = 1e-9
 """Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are
@@ -58,7 +58,7 @@ class SelfCheck:
 
 
 def compare_with_steps(
-    env: gym.Env, mdp: TabularMDP, states: StateIndex, payments: Payments, *, steps: int, seed: int
+    env: gym.Env, mdp: TabularMDP, states: States, payments: Payments, *, steps: int, seed: int
 ) -> SelfCheck:
     """Sample steps of a copy of the environment and compare them with a table.
 

@@ -3,17 +3,58 @@
 Any space made of integers is a product of finite ranges, so an observation is a number in mixed radix: its *code*. When
 every code is a state, row = code; when only some are (an enumeration found them), `codes` lists them in increasing order.
 A state that is reachable both as an ordinary and as a terminal state has two rows: the ordinary one, and a terminal copy
-at the end of the table, which `encode(..., terminated=True)` finds.
+at the end of the table, which `encode(..., terminated=True)` finds. `States` is the interface, which other numberings share.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, singledispatch
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from gymnasium import spaces
 
 from irl_gym.errors import NotDiscrete, UnknownObservation
+
+
+@runtime_checkable
+class States(Protocol):
+    """A numbering of states: what a StateIndex offers, and whatever can stand in its place, such as cells of a grid."""
+
+    @property
+    def space(self) -> spaces.Space:
+        """The observation space."""
+        ...
+
+    @property
+    def n_states(self) -> int:
+        """Number of rows, terminal copies included."""
+        ...
+
+    @property
+    def terminal_copies(self) -> Mapping[int, int]:
+        """Row of a state -> row of its terminal copy, for states entered both with and without `terminated`."""
+        ...
+
+    def is_batch(self, observation: Any) -> bool:
+        """Is this an array of observations, not a single one?"""
+        ...
+
+    def encode(self, observation: Any, *, terminated: bool = False) -> int:
+        """The row of an observation."""
+        ...
+
+    def encode_batch(self, observations: Any, *, terminated: np.ndarray | None = None) -> np.ndarray:
+        """The rows of a batch of observations: (N,) int64."""
+        ...
+
+    def decode_batch(self, rows: Any) -> Any:
+        """Observations of rows, stacked as vector environments stack them."""
+        ...
+
+    def decode(self, row: int) -> Any:
+        """The observation of a row."""
+        ...
 
 
 @singledispatch
@@ -182,7 +223,7 @@ class StateIndex:
             rows[copy] = row
         return rows
 
-    @cached_property
+    @property
     def n_states(self) -> int:
         """Number of rows, terminal copies included."""
         ordinary = int(np.prod(self._ranges[:, 1])) if self.codes is None else len(self.codes)

@@ -20,7 +20,7 @@ from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.mdp import TransitionTable
 from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.sampling import Successors
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 
 class TabularVecEnv(VecEnv):
@@ -46,7 +46,7 @@ class TabularVecEnv(VecEnv):
         *,
         num_envs: int = 64,
         max_episode_steps: int | None = None,
-        states: StateIndex | None = None,
+        states: States | None = None,
         seed: int | None = None,
     ):
         reward = as_reward(reward)

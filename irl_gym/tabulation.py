@@ -7,7 +7,7 @@ import numpy as np
 from irl_gym.mdp import TabularMDP, TransitionTable, entry_rows
 from irl_gym.rewards import RewardFunction, TabularReward
 from irl_gym.selfcheck import Payments, SelfCheck
-from irl_gym.states import StateIndex
+from irl_gym.states import States
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Tabulation:
     """(S, A) the environment's own reward, in expectation over successors."""
     payments: Payments
     """What single steps pay: mean, deviation, and the reward of each transition where s, a and s' settle it."""
-    states: StateIndex
+    states: States
     """Observations to rows and back."""
     evidence: Evidence
     """How it was obtained."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from irl_gym.errors import InvalidInput, InvalidReward
 from irl_gym.rewards import RewardFunction, TabularReward, as_reward
-from irl_gym.states import StateIndex
+from irl_gym.states import StateIndex, States
 
 
 def _as_function(reward: RewardFunction | np.ndarray | str) -> RewardFunction:
@@ -33,7 +33,7 @@ class LearnedReward(gym.Wrapper, gym.utils.RecordConstructorArgs):
         InvalidReward: a reward for another number of states or actions.
     """
 
-    def __init__(self, env: gym.Env, reward: RewardFunction | np.ndarray | str | os.PathLike, states: StateIndex | None = None):
+    def __init__(self, env: gym.Env, reward: RewardFunction | np.ndarray | str | os.PathLike, states: States | None = None):
         reward = os.fspath(reward) if isinstance(reward, os.PathLike) else reward
         gym.utils.RecordConstructorArgs.__init__(self, reward=reward, states=states)
         gym.Wrapper.__init__(self, env)

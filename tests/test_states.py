@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irl_gym.errors import NotDiscrete, UnknownObservation
-from irl_gym.states import StateIndex
+from irl_gym.states import StateIndex, States
 
 small = st.integers(1, 4)
 leaves = st.one_of(
@@ -183,3 +183,7 @@ def test_encode_refuses_what_is_no_member(name, observation):
 def test_encode_names_the_observation_that_is_outside():
     with pytest.raises(UnknownObservation, match=r"observation 7 is outside Discrete\(3\)"):
         StateIndex(spaces.Discrete(3)).encode_batch(np.array([0, 7, 9]))
+
+
+def test_state_index_offers_the_interface_of_states():
+    assert isinstance(StateIndex(spaces.Discrete(3)), States)

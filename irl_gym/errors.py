@@ -12,6 +12,7 @@ IrlGymError
 ├── UnknownEnvironment         an id that is not registered; the closest names are offered
 ├── NotDiscrete                a space with infinitely many elements where finitely many are needed
 ├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
+├── NotSettable                an environment that cannot be set to a given state
 ├── TableMismatch              `env.step` did what the table says is impossible
 ├── DegenerateExpert           equation (4) of Ng & Russell leaves no reward that prefers the expert's actions
 ├── SolverError
@@ -72,6 +73,10 @@ class NotDiscrete(IrlGymError):
 
 class NotTabular(IrlGymError):
     """An environment that publishes no table, or whose table is not the whole truth."""
+
+
+class NotSettable(IrlGymError):
+    """An environment that cannot be set to a given state."""
 
 
 class TableMismatch(IrlGymError):

@@ -84,7 +84,10 @@ def _(space: spaces.MultiBinary) -> np.ndarray:
 @_ranges.register
 def _(space: spaces.Box) -> np.ndarray:
     if space.dtype.kind not in "iub":
-        raise NotDiscrete(f"{space} holds floats: expected integers. Discretise the environment first.")
+        raise NotDiscrete(
+            f"{space} holds floats: expected integers. Discretise the environment first, with `discretize(env, gamma=..., "
+            "bins=...)` if its state can be set."
+        )
     low, high = space.low.ravel().astype(np.int64), space.high.ravel().astype(np.int64)
     if (high.astype(float) - low.astype(float)).max(initial=0.0) > 2**62:  # the count would wrap around
         raise NotDiscrete(f"{space} has more than 2^62 elements: too many to number. Give it narrower bounds.")

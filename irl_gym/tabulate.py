@@ -23,16 +23,14 @@ from irl_gym.selfcheck import compare_with_steps
 from irl_gym.states import StateIndex
 from irl_gym.tabular_env import TabularEnv
 from irl_gym.tabulation import Evidence, Tabulation, payments_of
+from irl_gym.watching import only_watches
 from irl_gym.wrappers import LearnedReward
 
-OWN_ENVIRONMENTS = ("irl_gym_envs:irl_gym/GridWorld-v0", "irl_gym_envs:irl_gym/FourRooms-v0")
+OWN_ENVIRONMENTS = (
+    "irl_gym_envs:irl_gym/GridWorld-v0", "irl_gym_envs:irl_gym/FourRooms-v0", "irl_gym_envs:irl_gym/MountainCar-v0",
+    "irl_gym_envs:irl_gym/ContinuousGridWorld-v0",
+)  # fmt: skip
 """Offered by name to who mistypes them; importing their module is what registers them."""
-
-WATCHING = frozenset({
-    "TimeLimit", "OrderEnforcing", "PassiveEnvChecker", "RecordEpisodeStatistics", "RecordVideo", "HumanRendering",
-    "RenderCollection", "Autoreset", "Monitor", "DataCollector",
-})  # fmt: skip
-"""Wrappers of Gymnasium, SB3 and Minari that only watch or limit; by name, since importing some needs packages of their own."""
 
 Source = Callable[[gym.Env, float], Tabulation | None]
 
@@ -61,7 +59,8 @@ def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int
     learned = _learned_reward(env)
     if not isinstance(env.action_space, spaces.Discrete):
         raise NotDiscrete(
-            f"the action space is {env.action_space}: expected Discrete. Discretise the actions with a wrapper first."
+            f"the action space is {env.action_space}: expected Discrete. Discretise the actions first, as with "
+            "`gymnasium.wrappers.DiscretizeAction`."
         )
     for source in SOURCES:
         found = source(env, gamma)
@@ -122,20 +121,13 @@ def _learned_reward(env: gym.Env) -> LearnedReward | None:
     while isinstance(wrapper, gym.Wrapper):
         if isinstance(wrapper, LearnedReward):
             learned = learned or wrapper
-        elif not _only_watches(wrapper):
+        elif not only_watches(wrapper):
             raise NotTabular(
                 f"the wrapper {type(wrapper).__name__} changes the environment outside its table: expected wrappers that only "
                 "watch or limit it. Tabulate `env.unwrapped`, or give the environment that change itself."
             )
         wrapper = wrapper.env
     return learned
-
-
-def _only_watches(wrapper: gym.Wrapper) -> bool:
-    """Does this wrapper leave observations, actions and rewards as they are? It steps as its base does, or it is known."""
-    kind = type(wrapper)
-    same = kind.step is gym.Wrapper.step and kind.reset is gym.Wrapper.reset
-    return same or kind.__name__ in WATCHING
 
 
 def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:

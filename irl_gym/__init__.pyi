@@ -4,12 +4,12 @@ from .datasets import read_minari as read_minari
 from .datasets import write_minari as write_minari
 from .demonstrations import collect as collect
 from .demonstrations import empirical_policy as empirical_policy
-from .demonstrations import feature_expectations as feature_expectations
 from .dynamic_programming import evaluate_policy as evaluate_policy
 from .dynamic_programming import policy_iteration as policy_iteration
 from .dynamic_programming import value_iteration as value_iteration
 from .errors import IrlGymError as IrlGymError
 from .experiment import Experiment as Experiment
+from .feature_sums import feature_expectations as feature_expectations
 from .learners.base import IRLResult as IRLResult
 from .learners.finite import FiniteLP as FiniteLP
 from .mdp import TabularMDP as TabularMDP

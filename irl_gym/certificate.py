@@ -95,14 +95,19 @@ class Certificate:
 
     def to_json(self) -> dict[str, Any]:
         """The certificate as json holds it: NaN becomes None."""
-        plain: dict[str, Any] = {}
-        for name in (*self.__dataclass_fields__, "duality_gap", "degenerate"):
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                plain[name] = [None if v != v else v for v in value.tolist()]
-            else:
-                plain[name] = None if value != value else value
-        return plain
+        return plain(self, "duality_gap", "degenerate")
+
+
+def plain(certificate: Any, *properties: str) -> dict[str, Any]:
+    """The fields of a certificate, and some of its properties, as json holds them: NaN becomes None."""
+    found: dict[str, Any] = {}
+    for name in (*certificate.__dataclass_fields__, *properties):
+        value = getattr(certificate, name)
+        if isinstance(value, np.ndarray):
+            found[name] = [None if v != v else v for v in value.tolist()]
+        else:
+            found[name] = None if value != value else value
+    return found
 
 
 def _comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:

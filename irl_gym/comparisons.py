@@ -43,19 +43,25 @@ class Comparisons:
         return np.asarray(difference.max(axis=1).todense()).ravel() <= SAME_SUCCESSORS
 
 
-def compare(table: TransitionTable, expert: Any) -> Comparisons:
+def compare(table: TransitionTable, expert: Any, among: np.ndarray | None = None) -> Comparisons:
     """The rows of (4) for an expert given as (S,) actions, (S, A) probabilities or an (S, A) set of optimal actions.
+
+    Args:
+        table: P.
+        expert: the policy.
+        among: (m,) increasing states whose rows are wanted; None for all.
 
     Raises:
         InvalidPolicy: wrong shape or content.
     """
     distribution = as_distribution(expert, table.n_states, table.n_actions)
-    taken = distribution > 0
+    among = np.arange(table.n_states) if among is None else among
+    taken = distribution[among] > 0
     several = taken.sum(axis=1) > 1
-    wanted = ~table.terminal[:, None] & (~taken | several[:, None])
-    states, actions = np.nonzero(wanted)
-    P_pi = table.P_pi(distribution)
-    rows = sp.csr_array(P_pi[states] - table.P[states * table.n_actions + actions])
+    positions, actions = np.nonzero(~table.terminal[among, None] & (~taken | several[:, None]))
+    states = among[positions]
+    P_pi = sp.csr_array(table.mixing(distribution)[among] @ table.P)
+    rows = sp.csr_array(P_pi[positions] - table.P[states * table.n_actions + actions])
     rows.data[np.abs(rows.data) <= ROUNDING] = 0.0  # what both actions share cancels, but for rounding
     rows.eliminate_zeros()
-    return Comparisons(rows, states, actions, taken[states, actions], distribution)
+    return Comparisons(rows, states, actions, taken[positions, actions], distribution)

@@ -12,9 +12,10 @@ import gymnasium as gym
 import numpy as np
 
 from irl_gym._typing import Matrix, StateMask
-from irl_gym.checks import checked_number, float_array
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.mdp import TransitionTable, check_discount
+from irl_gym.checks import checked_number
+from irl_gym.errors import InvalidDemonstrations
+from irl_gym.features import batch_size
+from irl_gym.mdp import TransitionTable
 from irl_gym.policies import Policy, as_distribution
 from irl_gym.sampling import Successors
 from irl_gym.states import States
@@ -54,7 +55,7 @@ class Episode:
                 f"an episode has {steps} actions and {len(self.rewards)} rewards: expected as many rewards as actions, and "
                 "at least one."
             )
-        count = _count(self.observations)
+        count = batch_size(self.observations)
         if count != steps + 1:
             raise InvalidDemonstrations(
                 f"an episode of {steps} actions has {count} observations: expected {steps + 1}, the last one included."
@@ -77,12 +78,6 @@ class Episode:
         ended = np.zeros(len(self) + 1, dtype=bool)
         ended[-1] = self.terminated
         return states.encode_batch(self.observations, terminated=ended)
-
-
-def _count(observations: Any) -> int:
-    while isinstance(observations, dict | tuple):
-        observations = next(iter(observations.values())) if isinstance(observations, dict) else observations[0]
-    return len(observations)
 
 
 def _stack(observations: Sequence[Any]) -> Any:
@@ -243,30 +238,3 @@ def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int
     if number < 0:
         raise InvalidDemonstrations("there are no episodes: expected at least one.")
     return EmpiricalPolicy(counts)
-
-
-def feature_expectations(episodes: Iterable[Episode], features: np.ndarray, states: States, gamma: float) -> np.ndarray:
-    """(K,) mean over episodes of sum_t gamma^t phi(s_t), starting with phi(s_0): equation (11) of Ng & Russell.
-
-    Args:
-        episodes: at least one.
-        features: (S, K) phi.
-        states: turns observations into rows of phi.
-        gamma: discount.
-
-    Raises:
-        InvalidDemonstrations: no episode.
-        InvalidDiscount: gamma outside (0, 1).
-        InvalidParameter: features of the wrong shape.
-    """
-    check_discount(gamma)
-    features = float_array("features", features, "(S, K) numbers", InvalidParameter)
-    if features.ndim != 2 or features.shape[0] != states.n_states:
-        raise InvalidParameter(f"the features have shape {features.shape}: expected ({states.n_states}, K).")
-    total, number = np.zeros(features.shape[1]), 0
-    for number, episode in enumerate(episodes, start=1):  # noqa: B007 (its last value is the count)
-        rows = episode.rows(states)
-        total += gamma ** np.arange(rows.size) @ features[rows]
-    if not number:
-        raise InvalidDemonstrations("there are no episodes: expected at least one.")
-    return total / number

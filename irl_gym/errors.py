@@ -6,6 +6,7 @@ IrlGymError
 │   ├── InvalidDiscount        gamma outside (0, 1)
 │   ├── InvalidPolicy          wrong shape, action out of range, rows that do not sum to 1
 │   ├── InvalidReward          wrong shape, NaN, a file that holds no reward
+│   ├── InvalidFeatures        features with NaN, of the wrong length, or of other observations
 │   ├── InvalidParameter       a hyper-parameter outside its range
 │   ├── UnknownObservation     an observation that the state index does not hold
 │   └── InvalidDemonstrations  episodes that no environment could have produced
@@ -49,6 +50,10 @@ class InvalidPolicy(InvalidInput):
 
 class InvalidReward(InvalidInput):
     """A reward of the wrong shape, with NaN, or a file that holds no reward."""
+
+
+class InvalidFeatures(InvalidInput):
+    """Features with NaN, of the wrong length, or of other observations than they are given."""
 
 
 class InvalidParameter(InvalidInput):

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TransitionTable
 
 FORMAT = "irl_gym.TabularReward/1"
+_UNREADABLE = (
+    ValueError, KeyError, EOFError, TypeError, NotImplementedError, OSError, AttributeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 @runtime_checkable
@@ -40,6 +43,8 @@ class TabularReward:
     Raises:
         InvalidReward: neither one nor two axes, or a value that is not finite.
     """
+
+    FORMATS: ClassVar[tuple[str, ...]] = (FORMAT,)
 
     values: np.ndarray
     """(S,) or (S, A) float64."""
@@ -95,11 +100,7 @@ class TabularReward:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
-        path = Path(path)
-        beside = path.with_name(f".{path.name}.tmp.npz")
-        header = json.dumps({"format": FORMAT, "note": dict(self.note)}, sort_keys=True, default=plain_json)
-        np.savez(beside, values=self.values, header=np.array(header))
-        beside.replace(path)
+        write_archive(path, {"format": FORMAT, "note": dict(self.note)}, {"values": self.values})
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> "TabularReward":
@@ -109,25 +110,40 @@ class TabularReward:
             FileNotFoundError: no such file.
             InvalidReward: the file holds no reward.
         """
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                header, values = json.loads(str(archive["header"])), archive["values"]
-        except FileNotFoundError:
-            raise
-        except (
-            ValueError,
-            KeyError,
-            EOFError,
-            TypeError,
-            NotImplementedError,
-            OSError,
-            zipfile.BadZipFile,
-            zlib.error,
-        ) as error:
-            raise InvalidReward(f"{path} holds no reward ({error}): expected a file written by TabularReward.save.") from error
-        if not isinstance(header, dict) or header.get("format") != FORMAT:
-            raise InvalidReward(f"{path} has format {header!r}: expected {FORMAT!r}. Was it written by a newer version?")
-        return cls(values, header.get("note", {}))
+        header, arrays = read_archive(path, cls.FORMATS)
+        if "values" not in arrays:
+            raise InvalidReward(f"{path} has no values: expected a file written by TabularReward.save.")
+        return cls(arrays["values"], header.get("note", {}))
+
+
+def write_archive(path: str | os.PathLike, header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays and a json header as an npz without pickle. Beside first, then renamed."""
+    path = Path(path)
+    beside = path.with_name(f".{path.name}.tmp.npz")
+    named: dict[str, Any] = {**arrays, "header": np.array(json.dumps(header, sort_keys=True, default=plain_json))}
+    np.savez(beside, **named)
+    beside.replace(path)
+
+
+def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a file that `write_archive` wrote. Nothing is unpickled.
+
+    Raises:
+        FileNotFoundError: no such file.
+        InvalidReward: another file, or one of another format.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            header = json.loads(str(archive["header"]))
+            arrays = {name: archive[name] for name in archive.files if name != "header"}
+    except FileNotFoundError:
+        raise
+    except _UNREADABLE as error:
+        raise InvalidReward(f"{path} holds no reward ({error}): expected a file that a reward's `save` wrote.") from error
+    if not isinstance(header, dict) or header.get("format") not in formats:
+        expected = " or ".join(map(repr, formats))
+        raise InvalidReward(f"{path} has format {header!r}: expected {expected}. Was it written by a newer version?")
+    return header, arrays
 
 
 def as_reward(reward: Any) -> TabularReward:

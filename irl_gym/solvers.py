@@ -34,6 +34,14 @@ class Status(enum.Enum):
         "R = 0 is optimal: the l1 penalty is above lambda_0, where no reward is worth its price. Lower l1 below "
         'certificate.lambda_0, or use l1="auto".'
     )
+    ZERO_WEIGHTS = (
+        "alpha = 0 is optimal: no reward in the span of the features is worth more than R = 0. Lower l1, or give features that "
+        "tell the expert's successors from other actions'."
+    )
+    INEXPRESSIBLE = (
+        "No reward in the span of the features makes the expert optimal, but those that tie it with everything; this one "
+        "violates least. Give more or other features."
+    )
 
 
 @dataclass(frozen=True)

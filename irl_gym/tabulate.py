@@ -16,6 +16,7 @@ from gymnasium import spaces
 
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
+from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.published_table import published_table
 from irl_gym.rewards import TabularReward
@@ -132,13 +133,15 @@ def _learned_reward(env: gym.Env) -> LearnedReward | None:
 
 def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:
     """The table with the reward that LearnedReward pays."""
-    mdp = found.mdp
-    if learned.states.n_states != mdp.n_states:
+    mdp, paid = found.mdp, learned.reward_function
+    if isinstance(paid, LinearReward):
+        paid = paid.tabular(found.states if learned.states is None else learned.states.n_states)
+    if learned.states is not None and learned.states.n_states != mdp.n_states:
         raise InvalidReward(
             f"the learned reward has {learned.states.n_states} states: expected {mdp.n_states}, the table's. Give "
             "LearnedReward the `states` of this table."
         )
-    payments = payments_of(mdp, learned.reward_function)
+    payments = payments_of(mdp, paid)
     return replace(found, reward=TabularReward(payments.mean, {"source": "LearnedReward"}), payments=payments)
 
 

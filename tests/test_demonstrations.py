@@ -6,9 +6,10 @@ import pytest
 from gymnasium import spaces
 from scipy.stats import ks_2samp
 
-from irl_gym.demonstrations import Episode, collect, collect_from_table, empirical_policy, feature_expectations
+from irl_gym.demonstrations import Episode, collect, collect_from_table, empirical_policy
 from irl_gym.dynamic_programming import occupancy, policy_iteration
-from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidParameter
+from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidFeatures, InvalidParameter
+from irl_gym.feature_sums import feature_expectations
 from irl_gym.metrics import policy_value
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.states import StateIndex
@@ -137,7 +138,7 @@ def test_feature_expectations_approach_the_occupancy(lake, expert):
 
 
 def test_feature_expectations_refuse_features_of_the_wrong_length():
-    with pytest.raises(InvalidParameter, match=r"\(5, 5\)"):
+    with pytest.raises(InvalidFeatures, match="5 states: expected 4"):
         feature_expectations([episode([0, 1], [0])], np.eye(5), STATES, 0.9)
 
 

@@ -4,32 +4,58 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-from irl_gym.certificate import Certificate
-from irl_gym.mdp import TabularMDP
+from irl_gym.linear_reward import LinearReward
+from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import Status
+
+
+@runtime_checkable
+class Proof(Protocol):
+    """What every certificate tells; each learner's says more."""
+
+    @property
+    def objective(self) -> float:
+        """The program's objective at the reward, recomputed."""
+        ...
+
+    @property
+    def duality_gap(self) -> float:
+        """How far the reward can be from the program's optimum."""
+        ...
+
+    @property
+    def degenerate(self) -> bool:
+        """Does the reward say nothing?"""
+        ...
+
+    def to_json(self) -> dict[str, Any]:
+        """As json holds it."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class IRLResult:
     """A learned reward and what it proves."""
 
-    reward: TabularReward
-    """(S,) paid on arrival, or (S, A)."""
+    reward: TabularReward | LinearReward
+    """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
     status: Status
     """What became of the program, in a sentence."""
     objective: float
     """The program's objective, recomputed from the reward."""
-    certificate: Certificate
-    """What the reward proves."""
+    certificate: Any
+    """What the reward proves: a Certificate of FiniteLP, or another `Proof`."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, seconds, iterations, program by program."""
+    policy: Policy | None = None
+    """A policy planned for the reward, where learning made one."""
 
 
 @runtime_checkable
 class Learner(Protocol):
-    """Turns an MDP without reward and an expert into a reward."""
+    """Turns a world without reward and an expert into a reward."""
 
-    def fit(self, mdp: TabularMDP, expert: Any) -> IRLResult:
-        """Learn a reward under which the expert is optimal."""
+    def fit(self, world: Any, expert: Any, /) -> IRLResult:
+        """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
         ...

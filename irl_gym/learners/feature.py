@@ -1,0 +1,233 @@
+"""Linear-programming IRL for large state spaces (Ng & Russell 2000, section 4; lecture notes 2.2.4).
+
+R = sum_i alpha_i phi_i (8), so V = sum_i alpha_i V_i (9), V_i the value of the expert's policy under phi_i. On a sample S_0:
+    maximise    sum_{s in S_0} min_{a != pi(s)} p(E_{s' ~ P_s,pi(s)} V(s') - E_{s' ~ P_sa} V(s')) - l1 ||alpha||_1
+    subject to  |alpha_i| <= 1,    p(x) = x for x >= 0, and 2 x below
+The features may express no reward that makes the expert optimal, so (10) is not a constraint: what violates it counts twice.
+States without another action of other successors are not counted.
+
+Departs: an action that the expert takes too, when it takes several, has to be as good; its rows d and -d both go into the sum,
+where they cost (penalty - 1) |d|. The certificate judges all reachable states of a table, not the sample only.
+Axes: S states, A actions, K features.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym.checks import checked_number, float_array
+from irl_gym.dynamic_programming import Discounted
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
+from irl_gym.features import FeatureMap, as_features, check_length
+from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
+from irl_gym.learners.base import IRLResult
+from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
+from irl_gym.learners.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
+from irl_gym.learners.weights import Weights, best_weights, most_agreement
+from irl_gym.linear_reward import LinearReward
+from irl_gym.mdp import TabularMDP
+from irl_gym.policies import Policy
+from irl_gym.solvers import SolverName, Status, check_solving
+from irl_gym.states import States
+
+NOTHING = 1e-8
+"""An objective or a sum of margins below this, over the size of the rows, is the solvers' rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureLP:
+    """Linear-programming IRL for large state spaces, with rewards linear in features (Ng & Russell 2000, section 4).
+
+    Raises:
+        InvalidParameter: a field outside its range.
+        InvalidFeatures: features that are neither a map nor an array (S, K).
+    """
+
+    features: FeatureMap | np.ndarray
+    """phi: a map, or an array (S, K) with one row a state."""
+    S_0: int | Sequence[int] | Sequence[Sequence[float]] | np.ndarray | None = None
+    """The sample: a number of states, drawn uniformly from those that count; the states themselves, as rows of the table or as
+    (m, d) states of a generative model; None for all."""
+    penalty: float = 2.0
+    """Slope of p below 0, at least 1: the paper's 2."""
+    l1: float = 0.0
+    """Price of ||alpha||_1, at least 0."""
+    samples: int = 1
+    """Rollouts for each state and action, where the world is a generative model."""
+    horizon: int | None = None
+    """Steps after which a rollout is cut; None for the least H with gamma^H <= 0.01."""
+    seed: int = 0
+    """Of the sample and of the rollouts."""
+    solver: SolverName = "auto"
+    """"auto" chooses by size; see `irl_gym.solvers`."""
+    time_limit: float | None = None
+    """Seconds for each program; None for no limit."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "features", as_features(self.features))
+        checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
+        checked_number("l1", self.l1, "a number of at least 0", least=0)
+        checked_number("samples", self.samples, "a whole number of at least 1", least=1, whole=True)
+        checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
+        if self.horizon is not None:
+            checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+        if self.S_0 is not None and np.ndim(self.S_0) == 0:
+            checked_number("S_0", self.S_0, "a number of at least 1, states, or None for all", least=1, whole=True)
+        elif self.S_0 is not None and not len(np.asarray(self.S_0)):
+            raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")
+        check_solving(self.solver, self.time_limit)
+
+    def fit(self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None) -> IRLResult:
+        """Learn the weights of a reward under which the expert is optimal, or violates (10) least.
+
+        Args:
+            world: a table, whose values are exact; or a generative model, whose values are means of rollouts.
+            expert: for a table (S,) actions, (S, A) probabilities or (S, A) set of optimal actions; else a policy with
+                `predict`.
+            states: turns rows of the table into the observations that the features are of, such as `tabulate(...).states`; None
+                where they are of rows.
+
+        Raises:
+            InvalidPolicy: an expert of the wrong shape or content.
+            InvalidParameter: S_0 with states outside the table.
+            InvalidFeatures: what the features give is not (N, K) finite numbers.
+            DegenerateExpert: S_0 has no state in which another action leads elsewhere.
+            NotSettable: the environment of a generative model cannot be set to a state.
+            SolverTimeout, SolverFailed: no answer.
+        """
+        if isinstance(world, GenerativeModel):
+            return self._fit_model(world, expert)
+        if isinstance(world, TabularMDP):
+            return self._fit_table(world, expert, states)
+        raise InvalidMDP(
+            f"the world is a {type(world).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
+            "GenerativeModel(env, gamma)."
+        )
+
+    @property
+    def phi(self) -> FeatureMap:
+        """The features, as a map."""
+        return as_features(self.features)
+
+    def _fit_table(self, mdp: TabularMDP, expert: Any, states: States | None) -> IRLResult:
+        size, decode = (mdp.n_states, _rows) if states is None else (states.n_states, states.decode_batch)
+        if size != mdp.n_states:
+            raise InvalidParameter(f"states has {size} states: expected {mdp.n_states}, the table's. Is it another table's?")
+        if states is None:
+            check_length(self.phi, mdp.n_states)
+        S_0: Any = self.S_0
+        chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed))
+        discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
+        found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted)
+        weights, status, expressible = self._solve(found)
+        reward = self._reward(weights)
+        values = reward.tabular(mdp.n_states if states is None else states).values
+        judged = judge_table(mdp, expert, values, discounted)
+        certificate = self._certificate(found, weights, judged, expressible, None)
+        return IRLResult(reward, status, certificate.objective, certificate, self._stats(weights, found))
+
+    def _fit_model(self, model: GenerativeModel, expert: Policy) -> IRLResult:
+        if not isinstance(expert, Policy):
+            raise InvalidPolicy(
+                f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
+            )
+        S_0 = self._states_of(model)
+        horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)
+        found = rows_of_model(model, expert, self.phi, S_0, samples=int(self.samples), horizon=horizon, seed=int(self.seed))
+        weights, status, expressible = self._solve(found)
+        error = None
+        if found.batches is not None:
+            spread = (found.batches @ weights.alpha).std(axis=0, ddof=1) / np.sqrt(len(found.batches))
+            error = float(spread.max())
+        margin = np.full(len(S_0), np.nan)
+        margin[found.states] = found.rows.least(weights.alpha)
+        tolerance = 1e-9 * found.rows.scale + 2 * (error or 0.0)
+        judged = Judged(margin, np.zeros(len(S_0)), tolerance, bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING))
+        certificate = self._certificate(found, weights, judged, expressible, error)
+        extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
+        return IRLResult(self._reward(weights), status, certificate.objective, certificate, self._stats(weights, found) | extra)
+
+    def _states_of(self, model: GenerativeModel) -> np.ndarray:
+        """(m, d) S_0 of a generative model."""
+        S_0: Any = self.S_0
+        if S_0 is None:
+            raise InvalidParameter(
+                "S_0 is None, all states: expected a number of states to draw, or (m, d) states of the model."
+            )
+        where = model.physics.coordinates
+        if np.ndim(S_0) == 0:
+            return model.states(int(S_0), np.random.default_rng(self.seed))
+        states = float_array("S_0", S_0, "(m, d) states", InvalidParameter)
+        if states.ndim != 2 or states.shape[1] != len(where.low):
+            raise InvalidParameter(
+                f"S_0 has shape {states.shape}: expected (m, {len(where.low)}), of {', '.join(where.names)}."
+            )
+        wrong = np.argwhere(~((states >= where.low) & (states <= where.high)))
+        if wrong.size:
+            row, j = wrong[0]
+            raise InvalidParameter(
+                f"S_0[{row}] has {where.names[j]} {states[row, j]:.6g}: expected {where.low[j]:.6g} to {where.high[j]:.6g}."
+            )
+        return states
+
+    def _solve(self, found: FeatureRows) -> tuple[Weights, Status, bool]:
+        """The weights, what became of them, and whether some reward of the span satisfies (10)."""
+        rows, solving = found.rows, {"solver": self.solver, "time_limit": self.time_limit}
+        weights = best_weights(rows, slope=float(self.penalty), l1=float(self.l1), **solving)
+        least, unit = rows.least(weights.alpha), NOTHING * rows.scale
+        expressible = bool(least.min() >= -unit and least.max() > unit)
+        if not expressible:
+            expressible = most_agreement(rows, **solving) > NOTHING
+        if rows.bound(weights.y, slope=float(self.penalty), l1=float(self.l1)) <= unit * rows.n_groups:
+            weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
+        status = weights.answer.status
+        if not expressible:
+            status = Status.INEXPRESSIBLE
+        elif not weights.alpha.any():
+            status = Status.ZERO_WEIGHTS
+        return weights, status, expressible
+
+    def _reward(self, weights: Weights) -> LinearReward:
+        return LinearReward(weights.alpha, self.phi, {"learner": "FeatureLP", "scaling": self.phi.scaling})
+
+    def _certificate(
+        self, found: FeatureRows, weights: Weights, judged: Judged, expressible: bool, error: float | None
+    ) -> FeatureCertificate:
+        rows, slope, l1 = found.rows, float(self.penalty), float(self.l1)
+        short = np.maximum(np.nan_to_num(-judged.margin), judged.tied)
+        violated = np.flatnonzero(short > judged.tolerance)
+        return FeatureCertificate(
+            expert_optimal=not violated.size,
+            worst_violation=float(np.maximum(short, 0.0).max(initial=0.0)),
+            margin=judged.margin,
+            violated=violated,
+            objective=rows.objective(weights.alpha, slope=slope, l1=l1),
+            dual_bound=rows.bound(weights.y, slope=slope, l1=l1),
+            penalty=slope,
+            l1=l1,
+            alpha_l1_norm=float(np.abs(weights.alpha).sum()),
+            states=int(np.unique(found.states).size),
+            trivial=found.trivial,
+            rank=rows.rank,
+            n_features=rows.d.shape[1],
+            expressible=expressible,
+            zero=not weights.alpha.any(),
+            constant=judged.constant,
+            standard_error=error,
+        )
+
+    def _stats(self, weights: Weights, found: FeatureRows) -> dict[str, Any]:
+        answer = weights.answer
+        program = {
+            "solver": answer.solver,
+            "seconds": answer.seconds,
+            "iterations": answer.iterations,
+            "attempts": answer.attempts,
+        }
+        return {"programs": {"weights": program | {"status": answer.status.value}}, "rows": len(found.rows.groups)}
+
+
+def _rows(rows: np.ndarray) -> np.ndarray:
+    return rows

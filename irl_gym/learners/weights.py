@@ -1,0 +1,209 @@
+"""The linear program over feature weights that sections 4 and 5 of Ng & Russell (2000) share, written with cvxpy.
+
+    unknowns    alpha (K,), |alpha_i| <= 1
+                u, v (G,) >= 0         what each group's least row has above and below 0
+    maximise    sum_g u_g - slope v_g - l1 ||alpha||_1
+    subject to  u_g - v_g <= d_r . alpha      for each row r of group g
+At the optimum u_g - v_g = min_r d_r . alpha, and u_g - slope v_g = p(that), with p(x) = x for x >= 0 and slope x below.
+In section 4 a group is a state and its rows are its actions; in section 5 a group is a policy found so far, with one row.
+
+`bound` is Lagrange's: for *any* y >= 0 with w_g = sum of y over group g between 1 and slope,
+    sum_i (|sum_r y_r d_ri| - l1)+
+is above every objective, whatever the solver did. Axes: K features, n rows, G groups.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+import scipy.sparse as sp
+
+from irl_gym.solvers import Answer, SolverName, solve
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a reward alpha . phi says of the expert, row by row."""
+
+    d: np.ndarray
+    """(n, K) expert's value minus the other's, feature by feature."""
+    groups: np.ndarray
+    """(n,) group of each row, 0 to G - 1, increasing."""
+
+    @property
+    def n_groups(self) -> int:
+        """G."""
+        return int(self.groups[-1]) + 1 if self.groups.size else 0
+
+    @property
+    def starts(self) -> np.ndarray:
+        """(G,) the first row of each group."""
+        return np.searchsorted(self.groups, np.arange(self.n_groups))
+
+    @property
+    def scale(self) -> float:
+        """The largest |d|; 1 where all are 0."""
+        return float(np.abs(self.d).max(initial=0.0)) or 1.0
+
+    @property
+    def rank(self) -> int:
+        """Rank of d: how many directions of alpha the expert says anything about."""
+        gram = (self.d / self.scale).T @ (self.d / self.scale)
+        values = np.linalg.eigvalsh(gram)
+        return int((values > max(values.max(initial=0.0), 1e-300) * len(gram) * 1e-14).sum())
+
+    def least(self, alpha: np.ndarray) -> np.ndarray:
+        """(G,) min over the rows of each group of d . alpha."""
+        return np.minimum.reduceat(self.d @ alpha, self.starts) if self.groups.size else np.zeros(0)
+
+    def active(self, alpha: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
+        """(G,) the row that is least in each group, and the slope of p there."""
+        values = self.d @ alpha
+        chosen = np.lexsort((values, self.groups))[self.starts]
+        return chosen, np.where(values[chosen] < 0, slope, 1.0)
+
+    def objective(self, alpha: np.ndarray, *, slope: float, l1: float) -> float:
+        """sum_g p(least) - l1 ||alpha||_1."""
+        least = self.least(alpha)
+        return float(np.where(least < 0, slope * least, least).sum()) - l1 * float(np.abs(alpha).sum())
+
+    def bound(self, y: np.ndarray, *, slope: float, l1: float) -> float:
+        """Lagrange's bound above every objective, from duals (n,) of any quality."""
+        y = np.maximum(np.nan_to_num(y), 0.0)
+        weight = np.bincount(self.groups, y, minlength=self.n_groups)
+        size = np.bincount(self.groups, minlength=self.n_groups)
+        empty = weight <= 0
+        y = np.where(empty[self.groups], 1 / size[self.groups], y)
+        weight = np.where(empty, 1.0, weight)
+        y = y * (np.clip(weight, 1.0, slope) / weight)[self.groups]
+        return float(np.maximum(np.abs(y @ self.d) - l1, 0.0).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """A solved program."""
+
+    alpha: np.ndarray
+    """(K,) within -1 to 1."""
+    y: np.ndarray
+    """(n,) duals of the rows."""
+    answer: Answer
+    """How the solver did."""
+
+
+SAMPLE = 2_000
+"""Groups up to which the program is solved as it stands; above, by generating its kinks."""
+
+
+def best_weights(
+    rows: Rows, *, slope: float, l1: float, solver: SolverName = "auto", time_limit: float | None = None
+) -> Weights:
+    """Solve the program.
+
+    An optimum is a vertex, at which at most K of the G concave terms have a kink; all others are linear around it. So with many
+    groups a term is taken as the linear piece that is active near the optimum of a sample, and its rows are put in when the
+    answer shows that another piece is lower there. Every program solved is a relaxation, and the last one, in which no piece
+    is missing, has the optimum of the whole.
+
+    Raises:
+        SolverTimeout, SolverFailed: no answer.
+    """
+    solving = _Solving(slope, l1, solver, time_limit)
+    if rows.n_groups <= SAMPLE:
+        return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(rows.d.shape[1]), solving)
+    part = np.zeros(rows.n_groups, dtype=bool)
+    part[np.linspace(0, rows.n_groups - 1, SAMPLE).astype(int)] = True
+    alpha = _solve_part(rows, part, np.zeros(rows.d.shape[1]), solving).alpha
+    part = _kinks(rows, alpha)
+    active, weight = rows.active(alpha, slope)
+    while True:
+        linear = (weight * ~part) @ rows.d[active]
+        found = _solve_part(rows, part, linear, solving)
+        least = rows.least(found.alpha)
+        model = weight * (rows.d[active] @ found.alpha)
+        missing = ~part & (model > np.where(least < 0, slope * least, least) + 1e-9 * rows.scale)
+        if not missing.any():
+            found.y[active[~part]] = weight[~part]
+            return found
+        part |= missing
+
+
+@dataclass(frozen=True)
+class _Solving:
+    slope: float
+    l1: float
+    solver: SolverName
+    time_limit: float | None
+
+
+def _kinks(rows: Rows, alpha: np.ndarray) -> np.ndarray:
+    """(G,) the groups nearest to a kink at alpha: where the least row is near 0, or near the next."""
+    least, chosen = rows.least(alpha), rows.active(alpha, 1.0)[0]
+    above = rows.d @ alpha - least[rows.groups]
+    above[chosen] = np.inf
+    second = np.minimum.reduceat(above, rows.starts)
+    near = np.minimum(np.abs(least), second)
+    mask = np.zeros(rows.n_groups, dtype=bool)
+    mask[np.argsort(near, kind="stable")[:SAMPLE]] = True
+    return mask
+
+
+def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solving) -> Weights:
+    """The program with the rows of some groups only; the others are in `linear` (K,), the gradient of their sum."""
+    kept = part[rows.groups]
+    d = rows.d[kept] / rows.scale
+    groups = (np.cumsum(part) - 1)[rows.groups[kept]]
+    n, G = len(d), int(part.sum())
+    alpha, u, v = cp.Variable(rows.d.shape[1]), cp.Variable(G, nonneg=True), cp.Variable(G, nonneg=True)
+    picks = sp.csr_array((np.ones(n), (np.arange(n), groups)), shape=(n, G))
+    above: Any = picks @ (u - v) <= d @ alpha
+    objective = cp.sum(u) - solving.slope * cp.sum(v) + (linear / rows.scale) @ alpha
+    constraints: list[Any] = [above, alpha <= 1, alpha >= -1]
+    if solving.l1:
+        size = cp.Variable(alpha.size)
+        constraints += [size >= alpha, size >= -alpha]
+        objective = objective - (solving.l1 / rows.scale) * cp.sum(size)
+    problem = cp.Problem(cp.Maximize(objective), constraints)
+    answer = solve(problem, rows=n, solver=solving.solver, time_limit=solving.time_limit)
+    y = np.zeros(len(rows.groups))
+    y[kept] = above.dual_value
+    return Weights(np.clip(_value(alpha), -1.0, 1.0), y, answer)
+
+
+def most_agreement(rows: Rows, *, solver: SolverName = "auto", time_limit: float | None = None) -> float:
+    """A bound above the mean of d . alpha, over scale, of all rewards that leave *no* row below 0.
+
+    Where it is 0, to rounding, the features express no reward that makes the expert optimal, but those that leave it tied with
+    everything. The rows that bind are generated: each program is a relaxation, so its bound holds for the whole.
+
+    Raises:
+        SolverTimeout, SolverFailed: no answer.
+    """
+    d = rows.d / rows.scale
+    mean = d.mean(axis=0)
+    part = np.zeros(len(d), dtype=bool)
+    alpha, bound = np.sign(mean), float(np.abs(mean).sum())
+    while True:
+        values = np.where(part, np.inf, d @ alpha)
+        worst = np.argsort(values, kind="stable")[:SAMPLE]
+        worst = worst[values[worst] < -1e-9]
+        if not worst.size:
+            return bound
+        part[worst] = True
+        bound, alpha = _agreement_of(d[part], mean, solver, time_limit)
+        if bound <= 1e-9:
+            return bound
+
+
+def _agreement_of(d: np.ndarray, mean: np.ndarray, solver: SolverName, time_limit: float | None) -> tuple[float, np.ndarray]:
+    alpha = cp.Variable(len(mean))
+    satisfied: Any = d @ alpha >= 0
+    problem = cp.Problem(cp.Maximize(mean @ alpha), [satisfied, alpha <= 1, alpha >= -1])
+    solve(problem, rows=len(d), solver=solver, time_limit=time_limit)
+    y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
+    return float(np.abs(mean + y @ d).sum()), _value(alpha)
+
+
+def _value(variable: cp.Variable) -> np.ndarray:
+    return np.asarray(variable.value, dtype=np.float64)

@@ -5,7 +5,10 @@ learning", 1997):
     multilinear   a step is made from each cell's centre, and its end is shared between the 2^d cells whose centres surround it
     sampled       steps are made from points drawn in the cell, and the cells that they end in are counted
 Where a step ends the episode, it leads to terminal copies of these cells. The first states are shared in the same way. The
-table is an approximation, and gets better with finer cells. Axes: S states, A actions, N points, d coordinates.
+table is an approximation, and gets better with finer cells. Without noise, "multilinear" sees no more of a cell than its
+centre: on 16 x 16 x 12 x 12 cells with velocities up to 2, all actions look equally good around CartPole's upright, and its
+greedy policy falls after 20 steps; 8 samples a cell see how near the end is, and theirs balances for 500.
+Axes: S states, A actions, N points, d coordinates.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,6 +27,7 @@ from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.physics import Physics, physics_of
 from irl_gym.rewards import TabularReward
 from irl_gym.selfcheck import Payments
+from irl_gym.tabular_env import TabularEnv
 from irl_gym.tabulation import Evidence, Tabulation
 
 BLOCK = 1_000_000
@@ -53,7 +57,9 @@ def discretize(
 ) -> Tabulation:
     """Make an approximate transition table of an environment whose state can be set. It is neither stepped nor reset itself.
 
-    The true reward (S, A) is the mean that the steps paid. States that no episode reaches are in the table too.
+    The true reward (S, A) is the mean that the steps paid. States that no episode reaches are in the table too. Measured on one
+    core: CartPole with 20^4 cells takes 3 s (its own step is made 320,000 times), Acrobot with 10^4 cells 1 s; a mountain car
+    with 1500^2 cells, stepped in NumPy, 7 s.
 
     Args:
         env: see `irl_gym.physics.physics_of`; a continuous action needs `gymnasium.wrappers.DiscretizeAction`.
@@ -80,21 +86,27 @@ def discretize(
     for name, value, least in (("samples", samples, 1), ("starts", starts, 1), ("seed", seed, 0)):
         checked_number(name, value, f"a whole number of at least {least}", least=least, whole=True)
     checked_number("memory_limit", memory_limit, "a number of bytes above 0, such as 4e9", above=0)
+    if isinstance(env.unwrapped, TabularEnv):
+        raise InvalidParameter(
+            f"{type(env.unwrapped).__name__} is a table: expected an environment that is none. Use tabulate."
+        )
     physics = physics_of(env, bounds=bounds)
     cells = Cells(physics.coordinates, bins)
     _check_size(cells, physics.n_actions, successors, samples, memory_limit)
     world = _World(physics, cells, successors, int(samples), int(seed))
-    P, R, deviation, largest, ending, lines = _assemble(world, on_progress or (lambda share: None))
-    states = replace(cells, ending=ending)
-    d0 = np.append(_first_states(world, int(starts)), np.zeros(len(ending)))
-    mdp = TabularMDP(P, gamma, d0)
-    R, deviation = (np.concatenate([moment, np.zeros((len(ending), physics.n_actions))]) for moment in (R, deviation))
+    table = _assemble(world, on_progress or (lambda share: None))
+    copies = len(table.ending)
+    mdp = TabularMDP(table.P, gamma, np.append(_first_states(world, int(starts)), np.zeros(copies)))
+    mean, deviation = (np.concatenate([part, np.zeros((copies, physics.n_actions))]) for part in (table.mean, table.deviation))
     evidence = Evidence(
         f"A grid of {' x '.join(map(str, cells.shape))} cells: of each, {METHODS[successors]} ({successors}; samples: "
         f"{samples}). The first states are those of {starts} resets.",
-        exact=False, merged=lines - mdp.P.nnz, split=len(ending), check=None,
+        exact=False, merged=table.lines - mdp.P.nnz, split=copies, check=None,
     )  # fmt: skip
-    return Tabulation(mdp, TabularReward(R, {"source": "environment"}), Payments(R, deviation, None, largest), states, evidence)
+    payments = Payments(mean, deviation, None, table.largest)
+    return Tabulation(
+        mdp, TabularReward(mean, {"source": "environment"}), payments, replace(cells, ending=table.ending), evidence
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,10 +182,25 @@ def _block(world: _World, rows: Indices) -> _Block:
     return _Block(P, total, square, largest, entries[0].size)
 
 
-def _assemble(
-    world: _World, on_progress: Callable[[float], None]
-) -> tuple[Any, np.ndarray, np.ndarray, float, np.ndarray, int]:
-    """P (S*A, S), mean and deviation (cells, A) of what is paid, the largest payment, cells with a copy, lines."""
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """All blocks together."""
+
+    P: Any
+    """(S*A, S) CSR, terminal copies included."""
+    mean: np.ndarray
+    """(cells, A) of what was paid."""
+    deviation: np.ndarray
+    """(cells, A) of what was paid."""
+    largest: float
+    """The largest |reward|."""
+    ending: np.ndarray
+    """Cells that have a terminal copy."""
+    lines: int
+    """Transitions before duplicates were added up."""
+
+
+def _assemble(world: _World, on_progress: Callable[[float], None]) -> _Table:
     n, A = world.cells.n_cells, world.physics.n_actions
     index_type = np.int32 if 2 * n < 2**31 else np.int64
     data, columns, counts, totals, squares, largest, lines = [], [], [], [], [], 0.0, 0
@@ -188,19 +215,20 @@ def _assemble(
         on_progress(share)
     indices = np.concatenate(columns)
     columns.clear()
+    values = np.concatenate(data)
+    data.clear()
     ends = indices >= n
     ending = np.unique(indices[ends]) - n
     indices[ends] = n + np.searchsorted(ending, indices[ends] - n)
     size = n + len(ending)
-    pointers = np.concatenate([[0], np.cumsum(np.concatenate(counts)), np.zeros(len(ending) * A, dtype=np.int64)])
-    pointers[n * A :] = len(indices)
-    values = np.concatenate(data)
-    data.clear()
-    P = sp.csr_array((values, indices, pointers.astype(np.int64)), shape=(size * A, size))
-    R = np.concatenate(totals) / world.samples
-    variance = np.maximum(np.concatenate(squares) / world.samples - R**2, 0)
-    deviation = np.sqrt(np.where(variance > 1e-12 * R**2, variance, 0.0))
-    return P, R, deviation, largest, ending.astype(np.int64), lines
+    pointers = np.full(size * A + 1, len(indices))  # rows of terminal copies are empty
+    pointers[: n * A + 1] = np.cumsum(np.concatenate([[0], *counts]))
+    P = sp.csr_array((values, indices, pointers), shape=(size * A, size))
+    mean = np.concatenate(totals) / world.samples
+    square = np.concatenate(squares) / world.samples
+    variance = square - mean**2
+    deviation = np.sqrt(np.where(variance > 1e-12 * square, variance, 0.0))
+    return _Table(P, mean, deviation, largest, ending.astype(np.int64), lines)
 
 
 def _first_states(world: _World, starts: int) -> np.ndarray:

@@ -103,7 +103,7 @@ def test_physics_sets_the_state_of_a_custom_environment(env):
     physics = physics_of(env)
     moves = physics.transition(np.array([[0.5], [0.99]]), np.array([0, 1]), np.random.default_rng(0))
     noise = np.random.default_rng(0).uniform(0, 0.1, size=2)
-    np.testing.assert_allclose(moves.states[:, 0], noise + [0.5, 1.09])
+    np.testing.assert_allclose(moves.states[:, 0], np.array([0.5, 1.09]) + noise)
     assert moves.terminated.tolist() == [False, True]
 
 

@@ -167,7 +167,10 @@ SLOTS = (_Methods, _Attribute, _Number)
 
 @dataclass(frozen=True, eq=False)
 class SteppedPhysics:
-    """A private copy of an environment, set to one state after the other and stepped: its own physics, but slowly."""
+    """A private copy of an environment, set to one state after the other and stepped: its own physics, but slowly.
+
+    Measured: 6 us a step of CartPole, 10 of MountainCar and Pendulum, 29 of Acrobot.
+    """
 
     coordinates: Coordinates
     """Of its states."""

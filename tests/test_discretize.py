@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from irl_gym import discretize as module
+from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrations import collect, empirical_policy
 from irl_gym.discretize import discretize
 from irl_gym.dynamic_programming import value_iteration
-from irl_gym.errors import InvalidDiscount, InvalidParameter, NotDiscrete, NotSettable
+from irl_gym.errors import DatasetMismatch, InvalidDiscount, InvalidParameter, NotDiscrete, NotSettable
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.tabular_vec_env import TabularVecEnv
 from irl_gym.tabulate import tabulate
@@ -181,6 +182,20 @@ def test_discretize_gives_states_that_a_learned_reward_uses(car):
     env.reset(seed=0, options={"state": [0.49, 0.05]})
     observation, paid, terminated, _, _ = env.step(2)
     assert terminated and paid == car.states.encode(observation, terminated=True) >= car.states.n_cells
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # Minari remarks on metadata left at their defaults
+@pytest.mark.parametrize("env_id", [CAR, "CartPole-v1"])
+def test_discretize_gives_states_that_datasets_are_checked_against(env_id, tmp_path):
+    env = gym.make(env_id, max_episode_steps=20)
+    states = discretize(env, gamma=0.9, bins=4).states
+    actor = TabularPolicy(np.full((states.n_states, int(env.action_space.n)), 1 / int(env.action_space.n)), states)
+    episodes = list(collect(env, actor, 2, seed=0))
+    write_minari(episodes, "irl_gym/continuous-v0", env, root=tmp_path, algorithm="random")
+    again = list(read_minari("irl_gym/continuous-v0", states=states, root=tmp_path))
+    np.testing.assert_array_equal(again[0].rows(states), episodes[0].rows(states))
+    with pytest.raises(DatasetMismatch, match="observations"):
+        list(read_minari("irl_gym/continuous-v0", states=discretize(pendulum(), gamma=0.9, bins=3).states, root=tmp_path))
 
 
 def test_tabulate_points_to_discretize_when_observations_are_floats():

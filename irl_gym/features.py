@@ -226,6 +226,13 @@ def batch_size(observations: Any) -> int:
     return len(observations)
 
 
+def take(observations: Any, which: Any) -> Any:
+    """Some observations of a stacked batch, by a slice or an array of positions."""
+    if isinstance(observations, dict):
+        return {key: take(value, which) for key, value in observations.items()}
+    return tuple(take(one, which) for one in observations) if isinstance(observations, tuple) else observations[which]
+
+
 def batch_of_one(observation: Any) -> Any:
     """One observation, stacked as a batch of one."""
     if isinstance(observation, dict):

@@ -22,6 +22,7 @@ from irl_gym.features import (
     check_length,
     checked_features,
     over_rows,
+    take,
 )
 from irl_gym.rewards import TabularReward, read_archive, write_archive
 from irl_gym.states import States
@@ -74,7 +75,7 @@ class LinearReward:
         if n * self.alpha.size <= 1 << 20:
             return checked_features(self.features, observations) @ self.alpha
         return np.concatenate(
-            [checked_features(self.features, _part(observations, b)) @ self.alpha for b in blocks(n, self.alpha.size)]
+            [checked_features(self.features, take(observations, b)) @ self.alpha for b in blocks(n, self.alpha.size)]
         )
 
     def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
@@ -136,12 +137,6 @@ def load_reward(path: str | os.PathLike) -> TabularReward | LinearReward:
 
 def _rows(rows: np.ndarray) -> np.ndarray:
     return rows
-
-
-def _part(observations: Any, part: slice) -> Any:
-    if isinstance(observations, dict):
-        return {key: _part(value, part) for key, value in observations.items()}
-    return tuple(_part(one, part) for one in observations) if isinstance(observations, tuple) else observations[part]
 
 
 def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:

@@ -1,0 +1,213 @@
+"""Linear-programming IRL from sampled trajectories (Ng & Russell 2000, section 5; lecture notes: "in the next lecture").
+
+Known are episodes of the expert, and a world that can be run and solved for a reward. With V^_i of (11), the mean over
+trajectories of sum_t gamma^t phi_i(s_t), the value of a policy under R = alpha . phi is alpha . V^. Round k:
+    maximise    sum_j p(alpha . (V^expert - V^_j)) over the policies j found so far
+    subject to  |alpha_i| <= 1,    p(x) = x for x >= 0, and 2 x below
+    then        find a policy optimal for alpha . phi, estimate its V^, and add it (12)
+from a random first policy. Trajectories are cut after H steps, which costs a value gamma^(H+1) R_max / (1 - gamma) at most
+(footnote 2).
+
+Which round is best? The paper looks at the policies. Here: the round whose policy has V^ nearest to the expert's in the sum of
+absolute differences. For *every* reward alpha . phi with |alpha_i| <= 1, the expert's own too if it is one of them, the values
+of policy and expert differ by that distance at most, and by the noise of the estimates. It takes no true reward to know it.
+Axes: N episodes, K features.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from irl_gym.checks import checked_number
+from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations
+from irl_gym.feature_sums import discounted_sums
+from irl_gym.features import FeatureMap, as_features, checked_features
+from irl_gym.generative import least_horizon, truncation_bound
+from irl_gym.learners.base import IRLResult
+from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
+from irl_gym.learners.weights import Rows, Weights, best_weights
+from irl_gym.linear_reward import LinearReward
+from irl_gym.policies import Policy
+from irl_gym.solvers import SolverName, Status, check_solving
+
+
+@runtime_checkable
+class World(Protocol):
+    """A world that can be run and solved for a reward; `irl_gym.simulator.Simulator` is one."""
+
+    @property
+    def gamma(self) -> float:
+        """Discount."""
+        ...
+
+    def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
+        """A policy for a reward of observations."""
+        ...
+
+    def sums(self, policy: Policy | None, features: FeatureMap, n: int, *, horizon: int, seed: int) -> np.ndarray:
+        """(N, K) sum_t gamma^t phi(s_t) of n episodes of a policy, random if None, cut after `horizon` steps."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """V^ of a policy and the covariance of its error."""
+
+    mean: np.ndarray
+    """(K,)."""
+    covariance: np.ndarray
+    """(K, K) of the mean."""
+
+    @classmethod
+    def of(cls, sums: np.ndarray) -> "Estimate":
+        """From (N, K) sums of episodes; one episode alone tells nothing of its error, which is then taken to be 0."""
+        n = len(sums)
+        spread = np.cov(sums, rowvar=False).reshape(sums.shape[1], -1) / n if n > 1 else np.zeros((sums.shape[1],) * 2)
+        return cls(sums.mean(axis=0), spread)
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryLP:
+    """Linear-programming IRL from sampled trajectories (Ng & Russell 2000, section 5).
+
+    Raises:
+        InvalidParameter: a field outside its range.
+        InvalidFeatures: features that are neither a map nor an array (S, K).
+    """
+
+    features: FeatureMap | np.ndarray
+    """phi of observations: a map, or an array (S, K) where these are integers."""
+    trajectories: int = 1_000
+    """m, run for each policy."""
+    horizon: int | None = None
+    """H, steps after which trajectories are cut, the expert's too; None for the least H with gamma^H <= 0.01. The shortest of
+    the expert's episodes that a time limit cut makes it shorter."""
+    max_rounds: int = 30
+    """Rounds at most."""
+    patience: int = 10
+    """`fit` stops when so many rounds in a row have not come nearer to the expert."""
+    penalty: float = 2.0
+    """Slope of p below 0, at least 1: the paper's 2."""
+    l1: float = 0.0
+    """Price of ||alpha||_1, at least 0."""
+    seed: int = 0
+    """Of trajectories and planners."""
+    solver: SolverName = "auto"
+    """"auto" chooses by size; see `irl_gym.solvers`."""
+    time_limit: float | None = None
+    """Seconds for each program; None for no limit."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "features", as_features(self.features))
+        checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
+        checked_number("l1", self.l1, "a number of at least 0", least=0)
+        checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
+        for name in ("trajectories", "max_rounds", "patience"):
+            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
+        if self.horizon is not None:
+            checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+        check_solving(self.solver, self.time_limit)
+
+    @property
+    def phi(self) -> FeatureMap:
+        """The features, as a map."""
+        return as_features(self.features)
+
+    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult:
+        """The best round: the one whose policy is nearest to the expert in the features.
+
+        Stops after `max_rounds`, when `patience` rounds have not come nearer, or when a policy cannot be told from the expert:
+        its distance is no more than the standard errors of its terms.
+
+        Args:
+            world: such as Simulator(env, planner, gamma).
+            episodes: the expert's, at least one; `read_minari` gives them.
+
+        Raises:
+            InvalidDemonstrations: no episode.
+            InvalidFeatures: what the features give is not (N, K) finite numbers.
+            SolverTimeout, SolverFailed: no answer.
+        """
+        results: list[IRLResult] = []
+        best = 0
+        for number, result in enumerate(self.iterate(world, episodes)):
+            results.append(result)
+            if result.certificate.distance < results[best].certificate.distance:
+                best = number
+            near = result.certificate.distance <= result.certificate.distance_error
+            if near or number - best >= self.patience:
+                break
+        history = [{key: one.stats[key] for key in ROUND} | {"distance": one.certificate.distance} for one in results]
+        stats = {**results[best].stats, "best_round": best + 1, "best_by": "distance", "rounds": history}
+        return replace(results[best], stats=stats)
+
+    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult]:
+        """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
+        expert = list(episodes)
+        horizon, r_unit = self._horizon(world.gamma, expert), self._largest(expert)
+        theirs = Estimate.of(discounted_sums(expert, self.phi, world.gamma, horizon=horizon))
+        found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
+        for number in range(1, self.max_rounds + 1):
+            rows = Rows(theirs.mean - np.array([one.mean for one in found]), np.arange(len(found)))
+            weights = best_weights(
+                rows, slope=float(self.penalty), l1=float(self.l1), solver=self.solver, time_limit=self.time_limit
+            )
+            reward = LinearReward(weights.alpha, self.phi, {"learner": "TrajectoryLP", "scaling": self.phi.scaling})
+            policy = world.plan(reward, seed=self.seed + number)
+            sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
+            newest = Estimate.of(sums)
+            cut = truncation_bound(world.gamma, horizon, r_unit)
+            certificate = self._certificate(rows, weights, theirs, found, newest, horizon, cut)
+            status = weights.answer.status if weights.alpha.any() else Status.ZERO_WEIGHTS
+            stats = {
+                "round": number, "regret": certificate.regret, "regret_error": certificate.regret_error,
+                "objective": certificate.objective, "seconds_solving": weights.answer.seconds, "expert_episodes": len(expert),
+            }  # fmt: skip
+            yield IRLResult(reward, status, certificate.objective, certificate, stats, policy)
+            found.append(newest)
+
+    def _horizon(self, gamma: float, expert: list[Episode]) -> int:
+        if not expert:
+            raise InvalidDemonstrations("there are no episodes: expected at least one of the expert's.")
+        asked = least_horizon(gamma) if self.horizon is None else int(self.horizon)
+        return min([asked, *(len(one) for one in expert if not one.terminated)])
+
+    def _largest(self, expert: list[Episode]) -> float:
+        """The largest ||phi||_1 that the expert met: no reward with |alpha_i| <= 1 pays it more."""
+        return max(float(np.abs(checked_features(self.phi, one.observations)).sum(axis=1).max()) for one in expert)
+
+    def _certificate(
+        self, rows: Rows, weights: Weights, theirs: Estimate, found: list[Estimate], newest: Estimate, horizon: int, cut: float
+    ) -> TrajectoryCertificate:
+        alpha, slope, l1 = weights.alpha, float(self.penalty), float(self.l1)
+
+        def error(other: Estimate) -> float:
+            return float(np.sqrt(max(alpha @ (theirs.covariance + other.covariance) @ alpha, 0.0)))
+
+        difference = theirs.mean - newest.mean
+        noise = np.sqrt(np.maximum(np.diag(theirs.covariance) + np.diag(newest.covariance), 0.0))
+        return TrajectoryCertificate(
+            gaps=rows.d @ alpha,
+            gap_errors=np.array([error(one) for one in found]),
+            regret=float(-difference @ alpha),
+            regret_error=error(newest),
+            distance=float(np.abs(difference).sum()),
+            distance_error=float(noise.sum()),
+            objective=rows.objective(alpha, slope=slope, l1=l1),
+            dual_bound=rows.bound(weights.y, slope=slope, l1=l1),
+            penalty=slope,
+            l1=l1,
+            alpha_l1_norm=float(np.abs(alpha).sum()),
+            rank=rows.rank,
+            n_features=rows.d.shape[1],
+            horizon=horizon,
+            truncation=cut,
+            zero=not alpha.any(),
+        )
+
+
+ROUND = ("round", "objective", "regret", "regret_error")
+"""What `fit` keeps of each round, with its distance."""

@@ -1,0 +1,84 @@
+"""What a reward learned from trajectories proves, from the sampled values alone. Axes: K features, k policies found before."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym.certificate import plain
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryCertificate:
+    """What a reward alpha . phi proves about the expert and the policies found."""
+
+    gaps: np.ndarray
+    """(k,) alpha . (V^expert - V^_j): how much better the expert is than each policy found before, under R; (12) wants >= 0."""
+    gap_errors: np.ndarray
+    """(k,) their standard errors."""
+    regret: float
+    """alpha . (V^new - V^expert): how much better a policy planned for R is than the expert, under R. At most 0, but for
+    noise, where the expert is optimal."""
+    regret_error: float
+    """Its standard error."""
+    distance: float
+    """||V^expert - V^new||_1: no reward with |alpha_i| <= 1 tells the new policy's value from the expert's by more."""
+    distance_error: float
+    """Sum of the standard errors of its K terms: what is left of it when the two policies are the same."""
+    objective: float
+    """sum_j p(gap_j) - l1 ||alpha||_1, recomputed."""
+    dual_bound: float
+    """No alpha has a larger objective."""
+    penalty: float
+    """Slope of p below 0."""
+    l1: float
+    """Price of ||alpha||_1."""
+    alpha_l1_norm: float
+    """||alpha||_1."""
+    rank: int
+    """Rank of the rows V^expert - V^_j."""
+    n_features: int
+    """K."""
+    horizon: int
+    """H, steps after which trajectories were cut."""
+    truncation: float
+    """What cutting changes a value by at most, gamma^(H+1) R_max / (1 - gamma); R_max: the largest ||phi||_1 the expert met."""
+    zero: bool
+    """Is alpha zero?"""
+
+    @property
+    def expert_optimal(self) -> bool:
+        """Is the expert as good as the planned policy, and as each one found before, to two standard errors?"""
+        errors = np.append(self.gap_errors, self.regret_error)
+        return bool((np.append(self.gaps, -self.regret) >= -2 * errors - 1e-9).all())
+
+    @property
+    def duality_gap(self) -> float:
+        """dual_bound - objective: how far alpha can be from the optimum."""
+        return self.dual_bound - self.objective
+
+    @property
+    def degenerate(self) -> bool:
+        """Is R zero, or does it tie the expert with all policies found before?"""
+        return self.zero or bool((np.abs(self.gaps) <= 2 * self.gap_errors).all())
+
+    def __str__(self) -> str:
+        """The certificate in a few lines a person reads."""
+        best = "yes, to two standard errors" if self.expert_optimal else "no"
+        noise = f"standard errors up to {self.gap_errors.max():.2g}"
+        lines = [
+            f"expert best under R      {best}, of {self.gaps.size} policies found before and the one planned for R",
+            f"value gaps               {self.gaps.min():.4g} to {self.gaps.max():.4g}, {noise}",
+            f"planned policy's gain    {self.regret:.4g} under R, standard error {self.regret_error:.2g}",
+            f"distance to the expert   {self.distance:.4g} in the features; {self.distance_error:.2g} is noise",
+            f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
+            f"features                 {self.n_features}; the rows have rank {self.rank}",
+            f"trajectories             cut after {self.horizon} steps, which costs a value {self.truncation:.2g} at most",
+        ]
+        if self.degenerate:
+            lines.append(f"degenerate               R {'is zero' if self.zero else 'ties the expert with every policy found'}")
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """The certificate as json holds it."""
+        return plain(self, "expert_optimal", "duality_gap", "degenerate")

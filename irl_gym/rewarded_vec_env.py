@@ -1,0 +1,35 @@
+"""A reward of observations in place of a vector environment's own, a batch at a time."""
+
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+
+from irl_gym.features import batch_of_one, take
+from irl_gym.linear_reward import LinearReward
+
+
+class RewardedVecEnv(VecEnvWrapper):
+    """Pays R = alpha . phi(s') on arrival, also where the arrival ends the episode; changes nothing else.
+
+    Args:
+        venv: Stable-Baselines3's vector environment.
+        reward: of its observations.
+    """
+
+    def __init__(self, venv: VecEnv, reward: LinearReward):
+        super().__init__(venv)
+        self.reward = reward
+
+    def reset(self) -> Any:
+        """Begin all episodes anew."""
+        return self.venv.reset()
+
+    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step all copies; those that end begin anew, and are paid for where they ended."""
+        observations, _, dones, infos = self.venv.step_wait()
+        paid = self.reward.of(observations)
+        for i in np.flatnonzero(dones).tolist():
+            ended = infos[i].get("terminal_observation", take(observations, i))
+            paid[i] = self.reward.of(batch_of_one(ended))[0]
+        return observations, paid.astype(np.float32), dones, infos

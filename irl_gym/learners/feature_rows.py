@@ -74,9 +74,9 @@ def _sample(mdp: TabularMDP, expert: Any, order: np.ndarray, wanted: int) -> np.
     found: list[np.ndarray] = []
     missing = wanted
     while missing > 0 and order.size:
-        part, order = np.sort(order[: 2 * missing]), order[2 * missing :]
-        comparisons = compare(mdp, expert, part)
-        good = np.unique(comparisons.states[~comparisons.trivial])
+        part, order = order[: 2 * missing], order[2 * missing :]
+        comparisons = compare(mdp, expert, np.sort(part))
+        good = part[np.isin(part, comparisons.states[~comparisons.trivial])]  # in the order drawn, or low numbers win
         found.append(good)
         missing -= good.size
     chosen = np.concatenate(found) if found else np.zeros(0, dtype=np.int64)

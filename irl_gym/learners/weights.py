@@ -19,7 +19,11 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
+from irl_gym.features import blocks
 from irl_gym.solvers import Answer, SolverName, solve
+
+ROUNDING = 1e-12
+"""Singular values of the rows below this, over the largest, are the rounding of values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +53,11 @@ class Rows:
     @property
     def rank(self) -> int:
         """Rank of d: how many directions of alpha the expert says anything about."""
-        gram = (self.d / self.scale).T @ (self.d / self.scale)
-        values = np.linalg.eigvalsh(gram)
-        return int((values > max(values.max(initial=0.0), 1e-300) * len(gram) * 1e-14).sum())
+        triangle = np.zeros((0, self.d.shape[1]))
+        for part in blocks(*self.d.shape):  # by QR: d^T d would square the condition, and lose what is below 1e-8
+            triangle = np.linalg.qr(np.concatenate([triangle, self.d[part] / self.scale]), mode="r")
+        values = np.linalg.svd(triangle, compute_uv=False)
+        return int((values > ROUNDING * values.max(initial=0.0)).sum())
 
     def least(self, alpha: np.ndarray) -> np.ndarray:
         """(G,) min over the rows of each group of d . alpha."""

@@ -1,0 +1,303 @@
+"""FeatureLP is the program of section 4 of Ng & Russell (2000), and its results prove what they say."""
+
+import json
+import pickle
+
+import models
+import numpy as np
+import pytest
+import reference
+from gymnasium import spaces
+from hypothesis import given
+from hypothesis import strategies as st
+
+from irl_gym.certificate import certify
+from irl_gym.features import Functions, OneHot, Table
+from irl_gym.learners import feature_rows, weights
+from irl_gym.learners.base import Learner, Proof
+from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.solvers import Status
+from irl_gym.states import StateIndex
+
+ALL_DIFFERENT = ("dense", "sparse", "terminal")
+"""Kinds without actions of equal successors, where the programs of sections 3 and 4 count the same rows."""
+
+
+def random_features(seed, S):
+    """(S, K) features of any K from 1 to S + 2, and a sample of at least half of the states."""
+    rng = np.random.default_rng([seed, 1])
+    Phi = rng.normal(size=(S, rng.integers(1, S + 3)))
+    return Phi, np.sort(rng.choice(S, size=rng.integers(S // 2, S + 1), replace=False))
+
+
+def drawn(seed, kind):
+    model = models.random_model(seed, S=8, kind=kind)
+    return model, *random_features(seed, 8)
+
+
+samples = st.builds(drawn, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(models.KINDS))
+
+
+# --- oracle: the paper ---
+
+
+@pytest.mark.parametrize("kind", models.KINDS)
+@pytest.mark.parametrize("penalty", [1.0, 2.0, 50.0])
+@pytest.mark.parametrize("l1", [0.0, 0.3])
+def test_feature_lp_objective_equals_the_dense_lp(kind, penalty, l1):
+    for seed in range(6):
+        model, Phi, S_0 = drawn(seed, kind)
+        expected, _ = reference.section_4_lp(model.P, 0.9, model.expert, Phi, S_0, penalty=penalty, l1=l1)
+        found = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert)
+        assert found.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_feature_lp_of_one_hot_features_is_the_finite_lp_when_the_penalty_is_large(seed):
+    model = models.random_model(seed, kind=ALL_DIFFERENT[seed % 3])
+    finite = FiniteLP(margin_cap=None, l1=0.0).fit(model.mdp, model.expert)
+    large = FeatureLP(OneHot(7), penalty=1e4).fit(model.mdp, model.expert)
+    assert large.objective == pytest.approx(finite.objective, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_feature_lp_of_one_hot_features_has_the_expert_among_the_greedy_policies(seed):
+    model = models.random_model(seed, kind=ALL_DIFFERENT[seed % 3])
+    acting = np.flatnonzero(~model.mdp.terminal)
+    for learner in (FiniteLP(margin_cap=None, l1=0.0), FeatureLP(OneHot(7), penalty=1e4)):
+        found = learner.fit(model.mdp, model.expert)
+        R = found.reward.values if isinstance(learner, FiniteLP) else found.reward.tabular(7).values
+        Q = reference.action_values(model.P, 0.9, model.P @ R, reference.values(model.P, 0.9, model.P @ R))
+        best = Q >= Q.max(axis=1, keepdims=True) - 1e-7
+        assert found.certificate.expert_optimal and best[acting, model.expert[acting]].all()
+
+
+def test_feature_lp_objective_is_12_6837_on_the_grid_of_the_paper():
+    grid = models.paper_grid()
+    found = FeatureLP(OneHot(25), penalty=1e3).fit(grid.mdp, grid.expert)
+    assert found.objective == pytest.approx(12.6837, abs=1e-4) and found.certificate.expert_optimal
+
+
+# --- property: what every result proves ---
+
+
+@given(sample=samples, penalty=st.sampled_from([1.0, 2.0, 50.0]), l1=st.sampled_from([0.0, 0.1, 1.0]))
+def test_feature_lp_duals_close_the_gap(sample, penalty, l1):
+    model, Phi, S_0 = sample
+    certificate = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert).certificate
+    assert -1e-9 <= certificate.duality_gap < 1e-6
+
+
+@given(sample=samples)
+def test_feature_lp_keeps_the_weights_within_the_box(sample):
+    model, Phi, S_0 = sample
+    assert np.abs(FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert).reward.alpha).max() <= 1
+
+
+@given(sample=samples)
+def test_feature_lp_pays_less_for_the_weights_when_l1_is_larger(sample):
+    model, Phi, S_0 = sample
+    low, high = (FeatureLP(Phi, S_0=S_0, l1=l1).fit(model.mdp, model.expert).certificate for l1 in (0.01, 0.5))
+    assert high.alpha_l1_norm <= low.alpha_l1_norm + 1e-7
+
+
+@given(model=models.models())
+def test_feature_lp_certificate_has_the_margins_of_the_finite_one(model):
+    found = FeatureLP(OneHot(model.mdp.n_states)).fit(model.mdp, model.expert)
+    expected = certify(model.mdp, model.expert, found.reward.tabular(model.mdp.n_states), l1=0.0, margin_cap=None)
+    judged = ~model.mdp.terminal
+    least = reference.margins(model.P, model.mdp.gamma, model.expert, found.reward.alpha)
+    np.testing.assert_allclose(found.certificate.margin[judged], least[judged], atol=1e-9)
+    assert found.certificate.expert_optimal == expected.expert_optimal
+
+
+@given(model=models.models())
+def test_feature_lp_makes_the_expert_optimal_when_the_true_reward_is_a_feature(model):
+    found = FeatureLP(model.R[:, None], penalty=1e4).fit(model.mdp, model.expert)
+    assert found.certificate.expert_optimal and found.certificate.expressible and found.status is Status.OPTIMAL
+
+
+@given(sample=samples)
+def test_feature_lp_counts_the_rank_of_the_rows(sample):
+    model, Phi, S_0 = sample
+    mixed = np.hstack([Phi, Phi @ np.ones((Phi.shape[1], 2))])  # two columns that add nothing
+    P_pi = model.P[np.arange(8), model.expert]
+    V = np.linalg.inv(np.eye(8) - 0.9 * P_pi) @ mixed
+    d = ((P_pi[S_0, None] - model.P[S_0]) @ V).reshape(-1, mixed.shape[1])
+    certificate = FeatureLP(mixed, S_0=S_0).fit(model.mdp, model.expert).certificate
+    assert (certificate.rank, certificate.n_features) == (np.linalg.matrix_rank(d, tol=1e-9), mixed.shape[1])
+
+
+@given(sample=samples)
+def test_feature_lp_counts_states_with_and_without_a_row(sample):
+    model, Phi, S_0 = sample
+    P_pi = model.P[np.arange(8), model.expert]
+    moving = np.abs(P_pi[:, None] - model.P).max(axis=(1, 2)) > 1e-12
+    certificate = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert).certificate
+    assert (certificate.states, certificate.trivial) == (moving[S_0].sum(), (~moving[S_0]).sum())
+
+
+def test_feature_lp_judges_states_outside_the_sample():
+    model = models.random_model(4, S=10)
+    certificate = FeatureLP(np.arange(10.0)[:, None], S_0=[2, 3]).fit(model.mdp, model.expert).certificate
+    assert certificate.states == 2 and np.isfinite(certificate.margin).sum() == 10
+
+
+# --- the sample ---
+
+
+def chosen(S_0, model, seed=0):
+    rng = np.random.default_rng(seed)
+    return feature_rows.chosen_states(model.mdp, model.expert, S_0, rng).tolist()
+
+
+def test_sample_is_all_acting_states_when_none_is_given():
+    assert chosen(None, models.random_model(0, kind="terminal")) == [0, 1, 2, 3, 4]
+
+
+def test_sample_leaves_out_states_without_a_row():
+    model = models.random_model(1, S=30, A=2, kind="walls")  # with two actions a wall leaves its state without a row
+    same = np.abs(model.P[:, 0] - model.P[:, 1]).max(axis=1) < 1e-12
+    assert chosen(10**6, model) == np.flatnonzero(~same).tolist()
+
+
+def test_sample_has_the_size_asked_for():
+    model = models.random_model(1, S=30, A=2, kind="walls")
+    assert [len(set(chosen(n, model))) for n in (1, 7, 15)] == [1, 7, 15]
+
+
+def test_sample_is_the_same_for_one_seed_and_another_for_the_next():
+    model = models.random_model(1, S=30)
+    assert chosen(5, model, 3) == chosen(5, model, 3) != chosen(5, model, 4)
+
+
+def test_sample_draws_each_state_alike():
+    model = models.random_model(1, S=10)
+    counts = np.bincount(np.concatenate([chosen(3, model, seed) for seed in range(1000)]), minlength=10)
+    assert np.abs(counts - 300).max() < 4 * np.sqrt(300 * 0.7)
+
+
+def test_feature_lp_repeats_itself_with_a_number_of_states():
+    model = models.random_model(1, S=30)
+    once, again = (FeatureLP(OneHot(30), S_0=5, seed=2).fit(model.mdp, model.expert) for _ in range(2))
+    np.testing.assert_array_equal(once.reward.alpha, again.reward.alpha)
+    assert once.certificate.states == 5
+
+
+def test_feature_lp_counts_a_state_once_when_it_is_given_twice():
+    model = models.random_model(1)
+    one, two = (FeatureLP(OneHot(7), S_0=S_0).fit(model.mdp, model.expert) for S_0 in ([1, 4], [4, 1, 4]))
+    assert two.objective == one.objective and two.certificate.states == 2
+
+
+# --- features ---
+
+
+@pytest.mark.parametrize("block", [1, 8, 24])
+def test_rows_do_not_depend_on_the_blocks_of_columns(monkeypatch, block):
+    model, Phi, S_0 = drawn(2, "sparse")
+    whole = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)
+    monkeypatch.setattr(feature_rows, "BLOCK", block)
+    parts = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)
+    np.testing.assert_allclose(parts.reward.alpha, whole.reward.alpha, atol=1e-12)
+
+
+def test_feature_lp_reads_arrays_tables_and_functions_alike():
+    model, Phi, S_0 = drawn(2, "dense")
+    maps = (Phi, Table(Phi), Functions(lambda rows: Phi[rows], Phi.shape[1]))
+    found = [FeatureLP(phi, S_0=S_0).fit(model.mdp, model.expert).objective for phi in maps]
+    assert found == pytest.approx([found[0]] * 3, abs=1e-12)
+
+
+def test_feature_lp_asks_for_features_of_observations_when_states_are_given():
+    model, Phi, _ = drawn(2, "dense")
+    states = StateIndex(spaces.MultiDiscrete([2, 4]))
+    of_pairs = Functions(lambda pairs: Phi[4 * pairs[:, 0] + pairs[:, 1]], Phi.shape[1])
+    expected = FeatureLP(Phi).fit(model.mdp, model.expert).objective
+    assert FeatureLP(of_pairs).fit(model.mdp, model.expert, states=states).objective == pytest.approx(expected, abs=1e-12)
+
+
+# --- what the features cannot say ---
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0])
+def test_feature_lp_says_inexpressible_when_the_features_are_constant(value):
+    model = models.random_model(0)
+    found = FeatureLP(np.full((7, 1), value)).fit(model.mdp, model.expert)
+    assert found.status is Status.INEXPRESSIBLE and not found.certificate.expressible
+
+
+def test_feature_lp_says_inexpressible_when_no_sign_of_the_feature_will_do():
+    model = models.random_model(0)
+    for seed in range(5):  # one random feature: seven states will not all agree with it
+        Phi = np.random.default_rng(seed).normal(size=(7, 1))
+        found = FeatureLP(Phi).fit(model.mdp, model.expert)
+        least = [reference.margins(model.P, 0.9, model.expert, sign * Phi[:, 0]).min() for sign in (1, -1)]
+        assert (found.status is Status.INEXPRESSIBLE) == (max(least) < -1e-9)
+
+
+def test_feature_lp_says_zero_weights_when_l1_is_too_high():
+    model = models.random_model(0)
+    found = FeatureLP(OneHot(7), l1=1e3).fit(model.mdp, model.expert)
+    assert found.status is Status.ZERO_WEIGHTS and found.certificate.zero and found.certificate.degenerate
+
+
+# --- kinds of expert ---
+
+
+def test_feature_lp_reads_actions_distribution_and_set_alike():
+    model = models.random_model(0, kind="walls")
+    one_hot = np.eye(3)[model.expert]
+    found = [FeatureLP(OneHot(7)).fit(model.mdp, expert).objective for expert in (model.expert, one_hot, one_hot > 0)]
+    assert found == pytest.approx([found[0]] * 3)
+
+
+def test_feature_lp_ties_the_actions_of_a_set():
+    grid = models.paper_grid()
+    Q = reference.action_values(grid.P, 0.9, grid.step_reward, reference.values(grid.P, 0.9, grid.step_reward))
+    optimal = Q >= Q.max(axis=1, keepdims=True) - 1e-9
+    certificate = FeatureLP(OneHot(25), penalty=1e3).fit(grid.mdp, optimal).certificate
+    assert certificate.expert_optimal and -1e-6 < certificate.duality_gap < 1e-6
+
+
+# --- the outcome ---
+
+
+@pytest.fixture(scope="module")
+def result():
+    model = models.random_model(0)
+    return FeatureLP(OneHot(7)).fit(model.mdp, model.expert)
+
+
+def test_feature_lp_is_a_learner_with_a_proof(result):
+    assert isinstance(FeatureLP(OneHot(7)), Learner) and isinstance(result.certificate, Proof)
+
+
+def test_feature_lp_result_survives_pickle(result):
+    again = pickle.loads(pickle.dumps(result))
+    assert again.certificate.to_json() == result.certificate.to_json() and again.status is result.status
+
+
+def test_feature_lp_certificate_is_json(result):
+    assert json.loads(json.dumps(result.certificate.to_json()))["objective"] == result.objective
+
+
+def test_feature_lp_certificate_reads_as_a_page(result):
+    text = str(result.certificate)
+    assert "expert optimal under R   yes" in text and "rank" in text
+
+
+def test_feature_lp_notes_the_scaling_of_its_features(result):
+    assert result.reward.note == {"learner": "FeatureLP", "scaling": "one-hot: 1 in the state, 0 elsewhere"}
+
+
+def test_feature_lp_stats_name_the_program(result):
+    assert result.stats["rows"] == 14 and result.stats["programs"]["weights"]["solver"] == "highs"
+
+
+def test_feature_lp_reaches_the_same_objective_by_generated_kinks(monkeypatch):
+    model, Phi, _ = drawn(2, "sparse")
+    whole = FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective
+    monkeypatch.setattr(weights, "SAMPLE", 2)
+    assert FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective == pytest.approx(whole, abs=1e-7)

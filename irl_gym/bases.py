@@ -27,7 +27,7 @@ class RadialBasis:
 
     centres: np.ndarray
     """(K, d)."""
-    sigma: np.ndarray
+    sigma: np.ndarray | float
     """(d,) or a number: widths, in the units of the coordinates; infinite leaves a coordinate out."""
     coordinates: Callable[[Any], np.ndarray] | None = None
     """Makes (N, d) coordinates of observations; None takes them as they are, flattened."""
@@ -47,9 +47,9 @@ class RadialBasis:
     @classmethod
     def grid(
         cls,
-        low: Sequence[float],
-        high: Sequence[float],
-        counts: int | Sequence[int],
+        low: Sequence[float] | np.ndarray,
+        high: Sequence[float] | np.ndarray,
+        counts: int | Sequence[int] | np.ndarray,
         *,
         width: float = 1.0,
         coordinates: Callable[[Any], np.ndarray] | None = None,
@@ -64,9 +64,12 @@ class RadialBasis:
             coordinates: as the field.
         """
         low_, high_ = _bounds(low, high)
-        each = np.broadcast_to(np.asarray(counts, dtype=int), low_.shape)
-        if (each < 1).any():
-            raise InvalidFeatures(f"counts is {counts}: expected at least one centre along each coordinate.")
+        given = np.asarray(counts)
+        if given.dtype.kind not in "iu" or given.shape not in ((), low_.shape) or (given < 1).any():
+            raise InvalidFeatures(
+                f"counts is {counts!r}: expected at least one centre along each coordinate, one whole number or {low_.size}."
+            )
+        each = np.broadcast_to(given, low_.shape)
         width = checked_number("width", width, "a number of spacings above 0", above=0, error=InvalidFeatures)
         axes = [np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2]) for a, b, n in zip(low_, high_, each, strict=True)]
         spacing = (high_ - low_) / np.maximum(each - 1, 1)
@@ -80,7 +83,7 @@ class RadialBasis:
     @property
     def scaling(self) -> str:
         """What comes out."""
-        widths = ", ".join(f"{s:.4g}" for s in self.sigma)
+        widths = ", ".join(f"{s:.4g}" for s in np.atleast_1d(self.sigma))
         return f"Gaussians of unit height, sigma {widths} in units of the coordinates, values 0 to 1"
 
     def __call__(self, observations: Any, columns: slice = ALL) -> np.ndarray:
@@ -103,9 +106,9 @@ class Fourier:
         InvalidFeatures: bounds that do not fit together, or an order below 0.
     """
 
-    low: Sequence[float]
+    low: Sequence[float] | np.ndarray
     """(d,) u = 0 there."""
-    high: Sequence[float]
+    high: Sequence[float] | np.ndarray
     """(d,) u = 1 there."""
     order: int = 3
     """n, at least 0."""
@@ -129,7 +132,7 @@ class Fourier:
     @property
     def scaling(self) -> str:
         """What comes out."""
-        return f"cosines of coordinates scaled from {list(self.low)}..{list(self.high)} to 0..1, values -1 to 1"
+        return f"cosines of coordinates scaled from {_span(self.low, self.high)} to 0..1, values -1 to 1"
 
     def __call__(self, observations: Any, columns: slice = ALL) -> np.ndarray:
         """(N, K) cosines."""
@@ -148,9 +151,9 @@ class Polynomial:
         InvalidFeatures: bounds that do not fit together, or a degree below 0.
     """
 
-    low: Sequence[float]
+    low: Sequence[float] | np.ndarray
     """(d,) u = -1 there."""
-    high: Sequence[float]
+    high: Sequence[float] | np.ndarray
     """(d,) u = 1 there."""
     degree: int = 2
     """At least 0."""
@@ -176,7 +179,7 @@ class Polynomial:
     @property
     def scaling(self) -> str:
         """What comes out."""
-        return f"monomials of coordinates scaled from {list(self.low)}..{list(self.high)} to -1..1, values -1 to 1 inside"
+        return f"monomials of coordinates scaled from {_span(self.low, self.high)} to -1..1, values -1 to 1 inside"
 
     def __call__(self, observations: Any, columns: slice = ALL) -> np.ndarray:
         """(N, K) monomials."""
@@ -191,7 +194,7 @@ def _coordinates(observations: Any, coordinates: Callable[[Any], np.ndarray] | N
     array = float_array(
         "the observations", observations, "numbers; give `coordinates` that makes (N, d) of them", InvalidFeatures
     )
-    array = array.reshape(len(array), -1)
+    array = array.reshape(len(array), int(np.prod(array.shape[1:])))  # not by -1, which no batch of none allows
     if array.shape[1] != d:
         raise InvalidFeatures(
             f"observations have {array.shape[1]} coordinates: expected {d}, as the features have. Give `coordinates` that "
@@ -200,12 +203,16 @@ def _coordinates(observations: Any, coordinates: Callable[[Any], np.ndarray] | N
     return array
 
 
-def _bounds(low: Sequence[float], high: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(low: Any, high: Any) -> tuple[np.ndarray, np.ndarray]:
     arrays = [float_array(name, value, "(d,) numbers", InvalidFeatures) for name, value in (("low", low), ("high", high))]
     fine = arrays[0].ndim == 1 and arrays[0].shape == arrays[1].shape and arrays[0].size
     if not (fine and np.isfinite(arrays).all() and (arrays[0] < arrays[1]).all()):
         raise InvalidFeatures(f"the bounds are {low} and {high}: expected finite low < high for each coordinate.")
     return arrays[0], arrays[1]
+
+
+def _span(low: Any, high: Any) -> str:
+    return f"{np.asarray(low).tolist()}..{np.asarray(high).tolist()}"
 
 
 def _order(order: Any) -> None:

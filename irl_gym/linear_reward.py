@@ -120,7 +120,7 @@ class LinearReward:
         header, arrays = read_archive(path, (FORMAT,))
         try:
             return cls(arrays["alpha"], _unpack(header["features"], arrays), header.get("note", {}))
-        except (KeyError, TypeError, AttributeError, InvalidFeatures) as error:
+        except (KeyError, TypeError, AttributeError, InvalidFeatures, InvalidReward) as error:
             raise InvalidReward(f"{path} holds no reward ({error}): expected a file written by LinearReward.save.") from error
 
 

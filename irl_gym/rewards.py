@@ -133,7 +133,7 @@ def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dic
         InvalidReward: another file, or one of another format.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:  # NumPy would leave a broken zip open
             header = json.loads(str(archive["header"]))
             arrays = {name: archive[name] for name in archive.files if name != "header"}
     except FileNotFoundError:

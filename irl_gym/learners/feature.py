@@ -85,7 +85,8 @@ class FeatureLP:
         Args:
             world: a table, whose values are exact; or a generative model, whose values are means of rollouts.
             expert: for a table (S,) actions, (S, A) probabilities or (S, A) set of optimal actions; else a policy with
-                `predict`.
+                `predict`. Probabilities of NaN say that nothing is known of a state, as in a policy read from data: it has no
+                row and is not judged, and what follows it has the value of random actions.
             states: turns rows of the table into the observations that the features are of, such as `tabulate(...).states`; None
                 where they are of rows.
 
@@ -118,13 +119,14 @@ class FeatureLP:
         if states is None:
             check_length(self.phi, mdp.n_states)
         S_0: Any = self.S_0
-        chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed))
+        expert, known = _completed(expert, mdp.n_states)
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
+        chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted)
         weights, status, expressible = self._solve(found)
         reward = self._reward(weights)
         values = reward.tabular(mdp.n_states if states is None else states).values
-        judged = judge_table(mdp, expert, values, discounted)
+        judged = judge_table(mdp, expert, known, values, discounted)
         certificate = self._certificate(found, weights, judged, expressible, None)
         return IRLResult(reward, status, certificate.objective, certificate, self._stats(weights, found))
 
@@ -227,6 +229,17 @@ class FeatureLP:
             "attempts": answer.attempts,
         }
         return {"programs": {"weights": program | {"status": answer.status.value}}, "rows": len(found.rows.groups)}
+
+
+def _completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
+    """An expert with random actions where nothing is known of it, and (S,) where something is."""
+    array = np.asarray(expert)
+    if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
+        return expert, np.ones(n_states, dtype=bool)
+    unknown = np.isnan(array).all(axis=1)
+    if unknown.all():
+        raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
+    return np.where(unknown[:, None], 1 / array.shape[1], array), ~unknown
 
 
 def _rows(rows: np.ndarray) -> np.ndarray:

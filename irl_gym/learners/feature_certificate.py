@@ -104,14 +104,14 @@ class Judged:
     """Is R the same everywhere?"""
 
 
-def judge_table(mdp: TabularMDP, expert: Any, R: np.ndarray, discounted: Discounted) -> Judged:
-    """Margins (S,) of every reachable state under R (S,), by one solve and one product."""
+def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, discounted: Discounted) -> Judged:
+    """Margins (S,) under R (S,) of every reachable state in which the expert is known, by one solve and one product."""
     distribution = as_distribution(expert, mdp.n_states, mdp.n_actions)
     V = discounted.solve(R)
     onwards = (mdp.P @ V).reshape(mdp.n_states, mdp.n_actions)
     advantage = (distribution * onwards).sum(axis=1, keepdims=True) - onwards
     taken = distribution > 0
-    judged = mdp.reachable & ~mdp.terminal
+    judged = mdp.reachable & ~mdp.terminal & known
     margin = np.where(taken, np.inf, advantage).min(axis=1)
     scale = float(np.abs(R).max(initial=0.0))
     tolerance = OPTIMAL_WITHIN * scale * (1 + 0.1 / (1 - mdp.gamma))

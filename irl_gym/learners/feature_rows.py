@@ -43,14 +43,21 @@ class FeatureRows:
 
 
 def chosen_states(
-    mdp: TabularMDP, expert: Any, S_0: int | Sequence[int] | np.ndarray | None, rng: np.random.Generator
+    mdp: TabularMDP,
+    expert: Any,
+    S_0: int | Sequence[int] | np.ndarray | None,
+    rng: np.random.Generator,
+    known: np.ndarray | None = None,
 ) -> np.ndarray:
     """(m,) increasing states of S_0: those given, a uniform sample of those that have a row, or all.
+
+    Only states of `known` (S,) are taken, in which something is known of the expert.
 
     Raises:
         InvalidParameter: S_0 empty, or with a state outside the table.
     """
-    acting = np.flatnonzero(mdp.reachable & ~mdp.terminal)
+    known = np.ones(mdp.n_states, dtype=bool) if known is None else known
+    acting = np.flatnonzero(mdp.reachable & ~mdp.terminal & known)
     if S_0 is None:
         return acting
     if np.ndim(S_0) == 0:
@@ -66,7 +73,7 @@ def chosen_states(
     wrong = states[(states < 0) | (states >= mdp.n_states)]
     if wrong.size:
         raise InvalidParameter(f"S_0 holds state {wrong[0]}: expected 0 to {mdp.n_states - 1}, the states of the table.")
-    return np.unique(states).astype(np.int64)
+    return np.unique(states[known[states]]).astype(np.int64)
 
 
 def _sample(mdp: TabularMDP, expert: Any, order: np.ndarray, wanted: int) -> np.ndarray:

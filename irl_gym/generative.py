@@ -64,7 +64,8 @@ class GenerativeModel:
     ) -> np.ndarray:
         """(N, K) mean over n rollouts of sum_t gamma^t phi(s_t), where s_0 is the successor of a state under an action.
 
-        All rollouts take all steps, also those that have ended, so that one seed gives every action the same random numbers.
+        All rollouts take all steps, so that one seed gives every action the same random numbers; those that have ended take
+        them from where they began, since a world may refuse a step after its end.
 
         Args:
             policy: acts from s_0 on, deterministically.
@@ -85,7 +86,8 @@ class GenerativeModel:
             if not alive.any():
                 break
             weight *= self.gamma
-            moves = physics.transition(here, self.actions(policy, here), rng)
+            moving = np.where(alive[:, None], here, repeated)
+            moves = physics.transition(moving, self.actions(policy, moving), rng)
             here = np.where(alive[:, None], moves.states, here)
             sums[alive] += weight * checked_features(features, observe(here[alive]))
             alive &= ~moves.terminated

@@ -7,9 +7,8 @@ from gymnasium import spaces
 from scipy.stats import ks_2samp
 
 from irl_gym.demonstrations import Episode, collect, collect_from_table, empirical_policy
-from irl_gym.dynamic_programming import occupancy, policy_iteration
-from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidFeatures, InvalidParameter
-from irl_gym.feature_sums import feature_expectations
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.metrics import policy_value
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.states import StateIndex
@@ -115,39 +114,12 @@ def test_empirical_policy_names_the_action_out_of_range():
         empirical_policy([episode([0, 1], [1]), episode([0, 1, 2, 3], [0, 1, 5])], STATES, 2)
 
 
-@pytest.mark.parametrize(
-    "count", [lambda e: empirical_policy(e, STATES, 2), lambda e: feature_expectations(e, np.eye(4), STATES, 0.9)]
-)
-def test_no_episodes_are_refused(count):
+def test_no_episodes_are_refused():
     with pytest.raises(InvalidDemonstrations, match="no episodes"):
-        count([])
-
-
-def test_feature_expectations_are_discounted_sums_from_the_first_state():
-    found = feature_expectations([episode([0, 1, 1], [0, 0]), episode([2, 3], [0])], np.eye(4), STATES, 0.5)
-    assert np.array_equal(found, np.array([1, 0.75, 1, 0.5]) / 2)
-
-
-def test_feature_expectations_approach_the_occupancy(lake, expert):
-    made = drawn(lake, expert, 4000, max_episode_steps=2000)
-    found = feature_expectations(made, np.eye(16), lake.states, 0.99)
-    exact = occupancy(lake.mdp, expert).sum(axis=1)
-    acting = ~lake.mdp.terminal
-    assert np.allclose(found[acting], exact[acting], atol=0.35)
-    assert found[acting].sum() == pytest.approx(exact.sum(), rel=0.03)
-
-
-def test_feature_expectations_refuse_features_of_the_wrong_length():
-    with pytest.raises(InvalidFeatures, match="5 states: expected 4"):
-        feature_expectations([episode([0, 1], [0])], np.eye(5), STATES, 0.9)
+        empirical_policy([], STATES, 2)
 
 
 @pytest.mark.parametrize("actions", [np.array([0.5]), np.array([[0]])])
 def test_an_episode_refuses_actions_that_are_not_integers(actions):
     with pytest.raises(InvalidDemonstrations, match="integers"):
         Episode(np.array([0, 1]), actions, np.zeros(1), True, False)
-
-
-def test_feature_expectations_refuse_a_discount_outside_the_interval():
-    with pytest.raises(InvalidDiscount, match="gamma is 2"):
-        feature_expectations([episode([0, 1], [0])], np.eye(4), STATES, 2.0)

@@ -80,7 +80,7 @@ class LinearReward:
 
     def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
         """The reward of steps (s, a, s'): batches (N, ...) of what the features are of, or single integers."""
-        if np.ndim(next_states) == 0:
+        if not isinstance(next_states, dict | tuple) and np.ndim(next_states) == 0:
             return self.of(np.asarray(next_states)[None])[0]
         return self.of(next_states)
 

@@ -2,6 +2,7 @@ import models
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from irl_gym.comparisons import compare
 from irl_gym.errors import InvalidPolicy
@@ -59,3 +60,36 @@ def test_compare_knows_the_actions_of_the_expert():
 def test_compare_refuses_what_is_no_policy():
     with pytest.raises(InvalidPolicy, match=r"policy\[s=6\] is action 3"):
         compare(models.random_model(0).mdp, np.array([0, 0, 0, 0, 0, 0, 3]))
+
+
+@given(model=models.models(), seed=st.integers(0, 99))
+def test_compare_among_some_states_gives_their_rows_of_the_whole(model, seed):
+    among = np.flatnonzero(np.random.default_rng(seed).random(model.mdp.n_states) < 0.5)
+    whole, part = compare(model.mdp, model.expert), compare(model.mdp, model.expert, among)
+    kept = np.isin(whole.states, among)
+    for name in ("states", "actions", "equal", "trivial"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[kept])
+    np.testing.assert_array_equal(part.rows.todense(), whole.rows.todense()[kept])
+
+
+def test_compare_among_some_states_demands_equality_of_a_set_there():
+    model = models.random_model(0)
+    both = np.zeros((7, 3), dtype=bool)
+    both[:, 0] = both[[1, 4], 2] = True
+    found = compare(model.mdp, both, np.array([4, 5]))
+    assert found.states.tolist() == [4, 4, 4, 5, 5] and found.equal.tolist() == [True, False, True, False, False]
+
+
+def test_compare_among_terminal_states_has_no_rows():
+    model = models.random_model(0, kind="terminal")
+    assert compare(model.mdp, model.expert, np.array([5, 6])).states.size == 0
+
+
+def test_compare_among_no_states_has_no_rows():
+    found = compare(models.random_model(0).mdp, np.zeros(7, dtype=int), np.zeros(0, dtype=int))
+    assert found.states.size == found.trivial.size == 0
+
+
+def test_compare_among_some_states_still_checks_the_policy_in_all():
+    with pytest.raises(InvalidPolicy, match=r"policy\[s=6\] is action 3"):
+        compare(models.random_model(0).mdp, np.array([0, 0, 0, 0, 0, 0, 3]), np.array([0]))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from irl_gym.errors import InvalidReward
-from irl_gym.rewards import FORMAT, RewardFunction, TabularReward
+from irl_gym.rewards import FORMAT, RewardFunction, TabularReward, as_reward, read_archive, write_archive
 
 
 @given(model=models.models())
@@ -139,3 +139,45 @@ def test_reward_refuses_values_that_are_no_table_of_numbers(values, message, unc
 def test_expected_refuses_the_reward_of_another_table(shape):
     with pytest.raises(InvalidReward, match=rf"shape \({shape[0]},.*expected \(7,\) or \(7, 3\)"):
         TabularReward(np.zeros(shape)).expected(models.random_model(0).mdp)
+
+
+def test_archive_holds_header_and_arrays(tmp_path):
+    write_archive(
+        tmp_path / "a.npz", {"format": "x/1", "n": np.int64(3), "shape": (2, 2)}, {"v": np.eye(2), "f.g": np.arange(3)}
+    )
+    header, arrays = read_archive(tmp_path / "a.npz", ("y/1", "x/1"))
+    assert header == {"format": "x/1", "n": 3, "shape": [2, 2]} and sorted(arrays) == ["f.g", "v"]
+    np.testing.assert_array_equal(arrays["v"], np.eye(2))
+
+
+def test_archive_of_another_format_is_refused_with_those_expected(tmp_path):
+    write_archive(tmp_path / "a.npz", {"format": "x/1"}, {})
+    with pytest.raises(InvalidReward, match=r"a\.npz has format .*expected 'y/1' or 'z/1'"):
+        read_archive(tmp_path / "a.npz", ("y/1", "z/1"))
+
+
+@pytest.mark.parametrize("content", [b"PK\x03\x04", b"PK\x05\x06", b"\x93NUMPY\x01"])
+def test_archive_that_is_cut_short_is_refused_and_closed(tmp_path, content):
+    (tmp_path / "a.npz").write_bytes(content)  # a file left open would be a ResourceWarning, and so an error
+    with pytest.raises(InvalidReward, match=r"a\.npz holds no reward"):
+        read_archive(tmp_path / "a.npz", (FORMAT,))
+
+
+def test_archive_cut_anywhere_is_refused(tmp_path):
+    TabularReward(np.arange(9.0)).save(tmp_path / "whole.npz")
+    whole = (tmp_path / "whole.npz").read_bytes()
+    for length in range(0, len(whole), 37):
+        (tmp_path / "cut.npz").write_bytes(whole[:length])
+        with pytest.raises(InvalidReward, match=r"cut\.npz holds no reward"):
+            TabularReward.load(tmp_path / "cut.npz")
+
+
+def test_load_refuses_a_file_without_values(tmp_path):
+    write_archive(tmp_path / "empty.npz", {"format": FORMAT}, {"weights": np.zeros(3)})
+    with pytest.raises(InvalidReward, match=r"empty\.npz has no values"):
+        TabularReward.load(tmp_path / "empty.npz")
+
+
+def test_as_reward_makes_a_table_of_an_array_and_leaves_one_as_it_is():
+    made = as_reward(np.arange(3.0))
+    assert isinstance(made, TabularReward) and as_reward(made) is made

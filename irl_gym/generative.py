@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl_gym.errors import InvalidPolicy
 from irl_gym.features import FeatureMap, checked_features
 from irl_gym.mdp import check_discount
 from irl_gym.physics import Physics, physics_of
@@ -47,9 +48,18 @@ class GenerativeModel:
         return rng.uniform(where.low, where.high, size=(n, len(where.low)))
 
     def actions(self, policy: Policy, states: np.ndarray) -> np.ndarray:
-        """(N,) what a policy does, deterministically, in states (N, d)."""
+        """(N,) what a policy does, deterministically, in states (N, d).
+
+        Raises:
+            InvalidPolicy: anything but one of the actions for each state.
+        """
         chosen, _ = policy.predict(self.physics.coordinates.observe(states), deterministic=True)
-        return np.asarray(chosen).astype(np.int64)
+        actions, n = np.asarray(chosen), self.physics.n_actions
+        if actions.shape != (len(states),) or actions.dtype.kind not in "iub" or not ((actions >= 0) & (actions < n)).all():
+            raise InvalidPolicy(
+                f"the policy gave {str(actions)[:90]} for {len(states)} observations: expected as many actions, 0 to {n - 1}."
+            )
+        return actions.astype(np.int64)
 
     def continuations(
         self,

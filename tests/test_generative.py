@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from irl_gym.dynamic_programming import Discounted, value_iteration
-from irl_gym.errors import InvalidDiscount, InvalidParameter, NotSettable
+from irl_gym.errors import InvalidDiscount, InvalidParameter, InvalidPolicy, NotSettable
 from irl_gym.features import OneHot, Table
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
 from irl_gym.learners.feature_rows import rows_of_model, rows_of_table
@@ -230,3 +230,14 @@ def test_bounds_of_an_unknown_coordinate_are_refused():
     model = GenerativeModel(gym.make("CartPole-v1"), 0.9, {"speed": (0, 1)})
     with pytest.raises(InvalidParameter, match="bounds names 'speed'"):
         model.states(3, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("actions", [[0, 4], [-1, 0], [0.0, 1.0], [0], [[0], [1]], 0, ["up", "up"]])
+def test_a_policy_of_other_actions_is_refused(actions):
+    class Wrong:
+        def predict(self, observation, state=None, episode_start=None, deterministic=False):
+            return np.array(actions), state
+
+    model = GenerativeModel(gym.make("FrozenLake-v1"), 0.9)
+    with pytest.raises(InvalidPolicy, match="for 2 observations: expected as many actions, 0 to 3"):
+        model.actions(Wrong(), np.zeros((2, 1)))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from irl_gym.certificate import certify
 from irl_gym.features import Functions, OneHot, Table
-from irl_gym.learners import feature_rows, weights
+from irl_gym.learners import weights
 from irl_gym.learners.base import Learner, Proof
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
@@ -118,89 +118,13 @@ def test_feature_lp_makes_the_expert_optimal_when_the_true_reward_is_a_feature(m
     assert found.certificate.expert_optimal and found.certificate.expressible and found.status is Status.OPTIMAL
 
 
-@given(sample=samples)
-def test_feature_lp_counts_the_rank_of_the_rows(sample):
-    model, Phi, S_0 = sample
-    mixed = np.hstack([Phi, Phi @ np.ones((Phi.shape[1], 2))])  # two columns that add nothing
-    P_pi = model.P[np.arange(8), model.expert]
-    V = np.linalg.inv(np.eye(8) - 0.9 * P_pi) @ mixed
-    d = ((P_pi[S_0, None] - model.P[S_0]) @ V).reshape(-1, mixed.shape[1])
-    certificate = FeatureLP(mixed, S_0=S_0).fit(model.mdp, model.expert).certificate
-    assert (certificate.rank, certificate.n_features) == (np.linalg.matrix_rank(d, tol=1e-9), mixed.shape[1])
-
-
-@given(sample=samples)
-def test_feature_lp_counts_states_with_and_without_a_row(sample):
-    model, Phi, S_0 = sample
-    P_pi = model.P[np.arange(8), model.expert]
-    moving = np.abs(P_pi[:, None] - model.P).max(axis=(1, 2)) > 1e-12
-    certificate = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert).certificate
-    assert (certificate.states, certificate.trivial) == (moving[S_0].sum(), (~moving[S_0]).sum())
-
-
 def test_feature_lp_judges_states_outside_the_sample():
     model = models.random_model(4, S=10)
     certificate = FeatureLP(np.arange(10.0)[:, None], S_0=[2, 3]).fit(model.mdp, model.expert).certificate
     assert certificate.states == 2 and np.isfinite(certificate.margin).sum() == 10
 
 
-# --- the sample ---
-
-
-def chosen(S_0, model, seed=0):
-    rng = np.random.default_rng(seed)
-    return feature_rows.chosen_states(model.mdp, model.expert, S_0, rng).tolist()
-
-
-def test_sample_is_all_acting_states_when_none_is_given():
-    assert chosen(None, models.random_model(0, kind="terminal")) == [0, 1, 2, 3, 4]
-
-
-def test_sample_leaves_out_states_without_a_row():
-    model = models.random_model(1, S=30, A=2, kind="walls")  # with two actions a wall leaves its state without a row
-    same = np.abs(model.P[:, 0] - model.P[:, 1]).max(axis=1) < 1e-12
-    assert chosen(10**6, model) == np.flatnonzero(~same).tolist()
-
-
-def test_sample_has_the_size_asked_for():
-    model = models.random_model(1, S=30, A=2, kind="walls")
-    assert [len(set(chosen(n, model))) for n in (1, 7, 15)] == [1, 7, 15]
-
-
-def test_sample_is_the_same_for_one_seed_and_another_for_the_next():
-    model = models.random_model(1, S=30)
-    assert chosen(5, model, 3) == chosen(5, model, 3) != chosen(5, model, 4)
-
-
-def test_sample_draws_each_state_alike():
-    model = models.random_model(1, S=10)
-    counts = np.bincount(np.concatenate([chosen(3, model, seed) for seed in range(1000)]), minlength=10)
-    assert np.abs(counts - 300).max() < 4 * np.sqrt(300 * 0.7)
-
-
-def test_feature_lp_repeats_itself_with_a_number_of_states():
-    model = models.random_model(1, S=30)
-    once, again = (FeatureLP(OneHot(30), S_0=5, seed=2).fit(model.mdp, model.expert) for _ in range(2))
-    np.testing.assert_array_equal(once.reward.alpha, again.reward.alpha)
-    assert once.certificate.states == 5
-
-
-def test_feature_lp_counts_a_state_once_when_it_is_given_twice():
-    model = models.random_model(1)
-    one, two = (FeatureLP(OneHot(7), S_0=S_0).fit(model.mdp, model.expert) for S_0 in ([1, 4], [4, 1, 4]))
-    assert two.objective == one.objective and two.certificate.states == 2
-
-
 # --- features ---
-
-
-@pytest.mark.parametrize("block", [1, 8, 24])
-def test_rows_do_not_depend_on_the_blocks_of_columns(monkeypatch, block):
-    model, Phi, S_0 = drawn(2, "sparse")
-    whole = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)
-    monkeypatch.setattr(feature_rows, "BLOCK", block)
-    parts = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)
-    np.testing.assert_allclose(parts.reward.alpha, whole.reward.alpha, atol=1e-12)
 
 
 def test_feature_lp_reads_arrays_tables_and_functions_alike():

@@ -24,7 +24,7 @@ from minari.dataset.minari_dataset import parse_dataset_id
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import DatasetExists, DatasetMismatch, InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.errors import DatasetExists, DatasetMismatch, DatasetMissing, InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.states import States
 
 _ROOT = "MINARI_DATASETS_PATH"
@@ -127,6 +127,28 @@ def _buffer(episode: Episode, first_action: int) -> EpisodeBuffer:
     return EpisodeBuffer(seed=episode.seed, infos={}, **columns)
 
 
+def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> minari.MinariDataset:
+    """Open a Minari dataset by its id.
+
+    Raises:
+        InvalidParameter: a malformed id.
+        FileNotFoundError: no dataset of that id under the root; those that are there are named.
+    """
+    with minari_root(root) as base:
+        try:
+            parse_dataset_id(dataset_id)
+        except (ValueError, TypeError) as error:
+            raise InvalidParameter(f"dataset id {dataset_id!r} is malformed ({error}): expected namespace/name-v0.") from error
+        if not (base / dataset_id).exists():
+            found = sorted(minari.list_local_datasets())
+            there = f"There are {', '.join(found[:5])}." if found else "There is none."
+            raise DatasetMissing(
+                f"dataset {dataset_id!r} is not under {base}: expected one of the datasets there. {there} Name the root "
+                "folder, or set MINARI_DATASETS_PATH."
+            )
+        return minari.load_dataset(dataset_id)
+
+
 def read_minari(
     dataset: minari.MinariDataset | str,
     *,
@@ -148,8 +170,7 @@ def read_minari(
         DatasetMismatch: recorded in another environment, or one with other observations.
     """
     if isinstance(dataset, str):
-        with minari_root(root):
-            dataset = minari.load_dataset(dataset)
+        dataset = load_minari(dataset, root=root)
     actions: Any = dataset.spec.action_space
     if not isinstance(actions, spaces.Discrete):
         raise NotDiscrete(f"dataset {dataset.spec.dataset_id!r} has actions {actions}: expected Discrete.")

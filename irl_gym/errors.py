@@ -22,6 +22,7 @@ IrlGymError
 │       └── SolverInfeasible   the answer is that the constraints contradict each other
 ├── DatasetMismatch            a dataset recorded in another environment
 ├── DatasetExists              a Minari id that is taken
+├── DatasetMissing (also a FileNotFoundError)  a Minari id that is not there
 └── RunConflict                a run folder that holds another run
 
 A message reads `what, with the value: what was expected. The mend.`
@@ -114,6 +115,10 @@ class DatasetMismatch(IrlGymError):
 
 class DatasetExists(IrlGymError):
     """A Minari dataset id that is taken."""
+
+
+class DatasetMissing(IrlGymError, FileNotFoundError):
+    """A Minari dataset id that is not there."""
 
 
 class RunConflict(IrlGymError):

@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from irl_gym import metrics
+from irl_gym._typing import ActionSets
+from irl_gym.dynamic_programming import policy_iteration, tied
+from irl_gym.errors import NotTabular
+from irl_gym.policies import support
+from irl_gym.worlds import TableWorld, discounted_mean
 
 if TYPE_CHECKING:
     from irl_gym.loop import Loop
@@ -20,45 +25,90 @@ GOOD = 0.9
 
 def evaluate(loop: "Loop") -> dict[str, Any]:
     """Judge the expert, a random policy, the retrained agent and the recovered reward."""
-    mdp, true = loop.table.mdp, loop.table.reward
-    random, expert = metrics.random_value(mdp, true), loop.true_value(loop.expert_actions)
-    policies = {"expert": loop.expert_actions, "random": loop.uniform, "retrained": loop.agent_actions}
+    experiment, world = loop.experiment, loop.world
+    random = world.value(world.random)
+    expert = discounted_mean(loop.demonstrations, world.gamma) if from_data(loop) else world.value(loop.expert)
     rows = {}
-    for number, (name, policy) in enumerate(policies.items()):
-        value = loop.true_value(policy)
-        episodes = loop.episodes(policy, loop.experiment.eval_episodes, loop.experiment.seed + 1_000_003 * (number + 1))
+    for number, (name, policy) in enumerate({"expert": loop.expert, "random": world.random, "retrained": loop.agent}.items()):
+        told = name == "expert" and from_data(loop)
+        seed = experiment.seed + 1_000_003 * (number + 1)
+        episodes = loop.demonstrations if told else world.episodes(policy, experiment.eval_episodes, seed)
         returns = np.array([episode.total_reward for episode in episodes])
-        mean, low, high = metrics.mean_interval(returns, rng=np.random.default_rng(loop.experiment.seed))
+        mean, low, high = metrics.mean_interval(returns, rng=np.random.default_rng(experiment.seed))
+        value = {"expert": expert, "random": random}.get(name)
+        value = world.value(policy) if value is None else value
         rows[name] = {
             "value": value,
             "score": _plain(metrics.normalised_score(value, random, expert)),
             "mean_return": mean,
             "return_low": low,
             "return_high": high,
-            "agreement": metrics.agreement(mdp, policy, loop.optimal_set),
+            "agreement": metrics.agreement(world.table.mdp, policy, optimal_set(loop))
+            if isinstance(world, TableWorld) and not told
+            else None,
         }
-    worst = metrics.worst_tie(mdp, loop.learned, true)
-    share = (expert - worst.value) / (expert - random) if expert != random else float("nan")
-    keys = ("l1", "lambda_0", "margin_cap", "duality_gap", "l1_norm", "least_l1_norm", "expert_optimal", "degenerate")
-    reward = {key: loop.certificate[key] for key in keys}
-    reward |= {
-        "worst_tie_value": worst.value,
-        "worst_tie_regret": expert - worst.value,
-        "worst_tie_regret_share": _plain(share),
-        "inseparable_states": len(loop.certificate["inseparable"]),
-        "marginless_states": len(loop.certificate["marginless"]),
+    training = {
+        "environment_steps": loop.stage("agent")["environment_steps"],
+        "steps_to_0.9": settled_at(learning_curve(loop), random, expert),
     }
-    crossing = settled_at(learning_curve(loop), random, expert)
-    check = loop.table.evidence.check
+    shown = {"policies": rows, "reward": _reward(loop, random, expert), "training": training}
+    return {**shown, "table": _table(world) if isinstance(world, TableWorld) else None, "demonstrations": _recorded(loop)}
+
+
+def from_data(loop: "Loop") -> bool:
+    """Is the expert known by episodes that were given only?"""
+    return loop.experiment.dataset is not None
+
+
+def _recorded(loop: "Loop") -> dict[str, Any]:
+    record = loop.stage("demonstrations")
+    return {"dataset": record["dataset_id"], "episodes": record["episodes"], "given": from_data(loop)}
+
+
+def optimal_set(loop: "Loop") -> ActionSets:
+    """(S, A) the expert's optimal set: all optimal actions if it is optimal or known by data only, else those it takes."""
+    world = loop.world
+    if not isinstance(world, TableWorld):
+        raise NotTabular("the environment is only stepped: expected a table. Which actions are optimal is not known.")
+    mdp, reward = world.table.mdp, world.table.reward
+    best = policy_iteration(mdp, reward)
+    tolerance = metrics.TIE_TOLERANCE * float(np.abs(reward.values).max())
+    if from_data(loop) or world.value(loop.expert) >= float(mdp.d0 @ best.V) - tolerance:
+        return tied(best.Q, tolerance)
+    return support(loop.expert, mdp.n_states, mdp.n_actions)
+
+
+def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
+    """The certificate's numbers, the sizes of its lists of states, and on tables what the worst tie loses."""
+    told: dict[str, Any] = {"learner": loop.stage("reward")["learner"], "status": loop.stage("reward")["status"]}
+    for key, value in loop.certificate.items():
+        if key in STATE_LISTS:
+            told[f"{key}_states"] = len(value)
+        elif not isinstance(value, list):
+            told[key] = value
+    world = loop.world
+    if isinstance(world, TableWorld):
+        worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
+        share = (expert - worst.value) / (expert - random) if expert != random else float("nan")
+        told |= {
+            "worst_tie_value": worst.value,
+            "worst_tie_regret": expert - worst.value,
+            "worst_tie_regret_share": _plain(share),
+        }
+    stats = loop.stage("reward")["stats"]
+    return told | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
+
+
+STATE_LISTS = ("inseparable", "marginless", "unconstrained", "violated")
+"""Lists of states in certificates; the metrics count them."""
+
+
+def _table(world: TableWorld) -> dict[str, Any]:
+    mdp, evidence = world.table.mdp, world.table.evidence
     return {
-        "policies": rows,
-        "reward": reward,
-        "training": {"environment_steps": loop.stage("agent")["environment_steps"], "steps_to_0.9": crossing},
-        "table": {
-            "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
-            "transitions": mdp.P.nnz, "split": loop.table.evidence.split,
-            "check": None if check is None else dict(vars(check)),
-        },
+        "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
+        "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
+        "check": None if evidence.check is None else dict(vars(evidence.check)),
     }  # fmt: skip
 
 

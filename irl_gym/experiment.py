@@ -4,15 +4,17 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
+
+import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Learner
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import check_discount
-from irl_gym.planners import FOR_ADVANTAGES, SB3, Planner, ValueIteration
+from irl_gym.planners import Planner
 from irl_gym.rewards import plain_json
 
 
@@ -22,27 +24,37 @@ class Experiment:
 
     Raises:
         InvalidDiscount: gamma outside (0, 1).
-        InvalidParameter: fewer than 1 episodes or copies.
+        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset; a dataset for FiniteLP.
     """
 
-    env_id: str
-    """A registered environment; `module:id` for one of another package."""
+    env_id: str | None
+    """A registered environment; `module:id` for one of another package; None for the one that the dataset was recorded in."""
     gamma: float
     """Discount, between 0 and 1."""
     env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Given to `gymnasium.make`."""
-    expert: Planner = field(default_factory=ValueIteration)
-    """Plans or learns under the true reward."""
+    bins: int | Sequence[int] | None = None
+    """Cells a coordinate, to make a table of an environment with continuous states; None for none."""
+    samples: int = 0
+    """Points drawn in each cell, whose steps are counted; 0 for the step from its centre, shared between its neighbours."""
+    dataset: str | None = None
+    """A Minari dataset of the expert's episodes, in place of an expert."""
+    dataset_root: str | None = None
+    """Minari's root folder; None for the one in force."""
+    expert: Planner | None = None
+    """Plans or learns under the true reward; None for ValueIteration where there is a table, else SB3."""
     episodes: int = 500
     """Demonstrations recorded."""
     learner: Learner = field(default_factory=lambda: FiniteLP(report_lambda_0=True))
-    """Recovers the reward."""
+    """Recovers the reward: FiniteLP, FeatureLP or TrajectoryLP."""
+    inner: Planner | None = None
+    """Solves for each reward that TrajectoryLP tries; None for ValueIteration where there is a table, else SB3."""
     shaping: bool = True
-    """Retrain on the expected advantage under the learned reward, clipped at the margin cap; else on the reward as it is."""
-    retrain: Planner = field(default_factory=lambda: SB3(hyperparameters=FOR_ADVANTAGES))
-    """Plans or learns under the learned reward."""
-    num_envs: int = 64
-    """Copies of the environment that SB3 trains on."""
+    """Retrain on the expected advantage under the learned reward, clipped; else on the reward as it is. It needs a table."""
+    retrain: Planner | None = None
+    """Plans or learns under the learned reward; None for SB3 with settings that suit that reward."""
+    num_envs: int | None = None
+    """Copies of the environment that SB3 trains on; None for 64 of a table, 8 of a world that is stepped."""
     eval_episodes: int = 200
     """Episodes for the mean returns."""
     seed: int = 0
@@ -50,26 +62,57 @@ class Experiment:
 
     def __post_init__(self) -> None:
         check_discount(self.gamma)
+        if (self.env_id or self.dataset) is None:
+            raise InvalidParameter(
+                "env_id and dataset are None: expected an environment, or a dataset that was recorded in one."
+            )
+        if self.dataset is not None and isinstance(self.learner, FiniteLP):
+            raise InvalidParameter(
+                f"the learner is FiniteLP, and dataset is {self.dataset!r}: expected a learner that needs no action in every "
+                "state. Use FeatureLP or TrajectoryLP."
+            )
+        checked_number("samples", self.samples, "a whole number of at least 0", least=0, whole=True)
         for name in ("episodes", "num_envs", "eval_episodes"):
-            checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
+            if name != "num_envs" or self.num_envs is not None:
+                checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
         expected = "a whole number from 0 to 2^32 - 1, as Stable-Baselines3 takes"
         checked_number("seed", self.seed, expected, least=0, below=2**32, whole=True)
-        for name in ("episodes", "num_envs", "eval_episodes", "seed"):
-            object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
+        for name in ("episodes", "num_envs", "eval_episodes", "samples", "seed"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
 
     @property
     def name(self) -> str:
         """A folder's name that no other experiment has: the environment and a digest of everything."""
         digest = hashlib.sha256(json.dumps(self.to_json(), sort_keys=True).encode()).hexdigest()[:8]
-        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id)}-{digest}"
+        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id or self.dataset or '')}-{digest}"
 
     def to_json(self) -> dict[str, Any]:
-        """The configuration as json; planners and learners with their class's name."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        for name, value in plain.items():
-            if is_dataclass(value) and not isinstance(value, type):
-                plain[name] = {"type": type(value).__name__, **asdict(value)}
-        return json.loads(json.dumps(plain, default=plain_json))
+        """The configuration as json; planners, learners and features with their class's name, large arrays by their digest."""
+        return {name: _described(getattr(self, name)) for name in self.__dataclass_fields__}
+
+
+MOST_LISTED = 64
+"""Numbers of an array that a configuration lists."""
+
+
+def _described(value: Any) -> Any:
+    """What json holds of a part of an experiment."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {
+            "type": type(value).__name__,
+            **{one.name: _described(getattr(value, one.name)) for one in fields(value) if one.init},
+        }
+    if isinstance(value, Mapping):
+        return {str(key): _described(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_described(one) for one in value]
+    if isinstance(value, np.ndarray) and value.size > MOST_LISTED:
+        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+        return {"array": list(value.shape), "sha256": digest}
+    if callable(value):
+        return getattr(value, "__qualname__", type(value).__name__)
+    return json.loads(json.dumps(value, default=plain_json))
 
 
 def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:

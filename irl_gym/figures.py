@@ -3,34 +3,70 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from irl_gym import plotting
 from irl_gym.dynamic_programming import evaluate_policy
-from irl_gym.evaluation import learning_curve
+from irl_gym.evaluation import from_data, learning_curve, optimal_set
 from irl_gym.layouts import grid_layout
-from irl_gym.metrics import optimal_actions, random_value
-from irl_gym.policies import as_distribution, support
+from irl_gym.linear_reward import LinearReward
+from irl_gym.metrics import optimal_actions
+from irl_gym.policies import as_distribution
+from irl_gym.worlds import SteppedWorld, TableWorld
 
 if TYPE_CHECKING:
     from irl_gym.loop import Loop
 
+RETURNS = 100
+"""Episodes of each policy in the figure of returns."""
+
 
 def draw(loop: "Loop", folder: Path) -> None:
-    """Draw rewards, values, policies and the learning curve as PNG."""
-    mdp, true, learned = loop.table.mdp, loop.table.reward, loop.learned
-    layout = grid_layout(loop.env, mdp)
-    values = [evaluate_policy(mdp, reward.expected(mdp), loop.expert_actions) for reward in (true, learned)]
-    agent = as_distribution(loop.agent_actions, mdp.n_states, mdp.n_actions)
-    expert = support(loop.expert_actions, mdp.n_states, mdp.n_actions)
+    """Draw rewards, values, policies and the learning curve as PNG; where there is no table, returns and the curve."""
+    levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
     curve = learning_curve(loop)
-    pictures = {
-        "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp),
-        "values.png": plotting.draw_values(layout, values[0], values[1], mdp),
-        "policies.png": plotting.draw_policies(layout, expert, agent, optimal_actions(mdp, true), mdp),
-        "learning_curve.png": plotting.draw_learning_curve(
-            {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])},
-            expert=loop.true_value(loop.expert_actions),
-            random=random_value(mdp, true),
-        ),
-    }
+    pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else _of_steps(loop, loop.world)
+    pictures["learning_curve.png"] = plotting.draw_learning_curve(
+        {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])}, **levels
+    )
     for name, figure in pictures.items():
         plotting.save_figure(figure, folder / name)
+
+
+def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
+    table = world.table
+    mdp, true, learned = table.mdp, table.reward, world.tabular(loop.learned)
+    layout = grid_layout(loop.env, mdp) if table.evidence.exact else None
+    expert = loop.expert
+    if expert.ndim == 2:  # read from data: where nothing is known, random
+        known = ~np.isnan(expert).any(axis=1)
+        expert = np.where(known[:, None], expert, 1 / mdp.n_actions)
+        taken = (expert > 0) & known[:, None]
+    else:
+        taken = as_distribution(expert, mdp.n_states, mdp.n_actions) > 0
+    values = [evaluate_policy(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
+    agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
+    optimal = optimal_actions(mdp, true) if not from_data(loop) else optimal_set(loop)
+    return {
+        "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp),
+        "values.png": plotting.draw_values(layout, values[0], values[1], mdp),
+        "policies.png": plotting.draw_policies(layout, taken, agent, optimal, mdp),
+    }
+
+
+def _of_steps(loop: "Loop", world: SteppedWorld) -> dict[str, plotting.Figure]:
+    """The recovered reward's return of episodes against the true one's."""
+    reward = loop.learned
+    if not isinstance(reward, LinearReward):
+        return {}
+    seed = loop.experiment.seed + 31_337
+    episodes = {
+        "expert": loop.demonstrations[:RETURNS],
+        "random": world.episodes(world.random, RETURNS, seed),
+        "retrained": world.episodes(loop.agent, RETURNS, seed + RETURNS),
+    }
+    points = {
+        name: np.array([[one.total_reward, reward.of(one.observations)[1:].sum()] for one in some])
+        for name, some in episodes.items()
+    }
+    return {"returns.png": plotting.draw_returns(points)}

@@ -53,7 +53,7 @@ def grid_layout(env: gym.Env, table: TransitionTable) -> GridLayout | None:
         env: the environment, wrapped or not.
         table: its table, which may have rows for terminal copies after those of the cells.
     """
-    shape = _shape(env.unwrapped)
+    shape = grid_shape(env)
     space = env.observation_space
     if shape is None or not isinstance(space, spaces.Discrete) or shape[0] * shape[1] != int(space.n):
         return None
@@ -69,8 +69,9 @@ def grid_layout(env: gym.Env, table: TransitionTable) -> GridLayout | None:
     return GridLayout(shape, directions, blocked, terminal, letters)
 
 
-def _shape(base: Any) -> tuple[int, int] | None:
-    """Rows and columns, from whichever attribute the environment has."""
+def grid_shape(env: gym.Env) -> tuple[int, int] | None:
+    """Rows and columns of a grid environment, from whichever attribute it has; None if it has none."""
+    base: Any = env.unwrapped
     if hasattr(base, "desc"):
         found: Any = np.shape(base.desc)
     elif hasattr(base, "nrow") and hasattr(base, "ncol"):

@@ -1,11 +1,11 @@
 """The stages of the loop, in order, over a run folder.
 
-    table           `tabulate`: P, d0 and the true reward; checked against `env.step`
-    expert          a planner on the true reward
-    demonstrations  episodes of the expert, a Minari dataset
-    reward          a learner, from P and the expert's policy (Ng & Russell's section 3 takes the complete policy, not episodes)
-    agent           a planner that sees only the learned reward, shaped by its expected advantage
-    metrics         exact values under the true reward, returns of episodes in the environment itself
+    table           `tabulate` or `discretize`: P, d0 and the true reward; none where the environment can only be stepped
+    expert          a planner on the true reward; or what a dataset says of the expert's policy
+    demonstrations  episodes of the expert, a Minari dataset; or the dataset that was given
+    reward          a learner: from P and the expert's policy (Ng & Russell, sections 3 and 4), or from episodes (section 5)
+    agent           a planner that sees only the learned reward, on a table shaped by its expected advantage
+    metrics         values under the true reward, exact on tables, and returns of episodes in the environment itself
     figures         rewards, values, policies, learning curve
 The true reward enters the table, the expert and the judging only; the learning curve judges, it does not steer.
 """
@@ -15,32 +15,37 @@ import os
 import re
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
-from irl_gym import figures, metrics
-from irl_gym._typing import Actions, ActionSets
-from irl_gym.datasets import write_minari
-from irl_gym.demonstrations import Episode, collect, collect_from_table
-from irl_gym.dynamic_programming import policy_iteration, tied
+from irl_gym import figures
+from irl_gym.choices import environment_of
+from irl_gym.datasets import read_minari, write_minari
+from irl_gym.demonstrations import Episode, empirical_policy
+from irl_gym.discretize import discretize
+from irl_gym.errors import NotDiscrete, NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
-from irl_gym.planners import Agent, Planner, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution, support
+from irl_gym.learners.base import IRLResult, Learner
+from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.planners import Agent, Planner
+from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder, read_json, write_json
-from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged
-from irl_gym.tabular_vec_env import TabularVecEnv
-from irl_gym.tabulate import make, tabulate
-from irl_gym.tabulation import Tabulation
+from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
+from irl_gym.simulator import Simulator
+from irl_gym.tabulate import tabulate
+from irl_gym.worlds import SteppedWorld, TableWorld
 
 STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
-"""After the table, which is made anew at each start: it is cheap and exact."""
-DEFAULT_EPISODE_STEPS = 500
-"""Time limit of episodes in environments that have none."""
+"""After the table, which is made anew at each start: it is cheap."""
 
 OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
@@ -55,26 +60,38 @@ class Loop:
         on_progress: told how far each stage is.
 
     Raises:
-        UnknownEnvironment, NotTabular, NotDiscrete: no table can be made.
+        UnknownEnvironment: no such environment.
+        NotTabular, NotDiscrete: no table can be made, and the learner needs one.
+        DatasetMismatch: the dataset was recorded in another environment.
         RunConflict: the folder holds another run.
     """
 
     def __init__(self, experiment: Experiment, out: str | os.PathLike, on_progress: OnProgress | None = None):
         self.experiment = experiment
-        self.env = make(experiment.env_id, **experiment.env_kwargs)
         self.report_progress = on_progress or (lambda stage, share: None)
         self.report_progress("table", 0.0)
         start = time.perf_counter()
-        self.table: Tabulation = tabulate(self.env, gamma=experiment.gamma, seed=experiment.seed)
+        self.env = environment_of(experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root)
+        self.world: TableWorld | SteppedWorld = self._world()
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(out, experiment.to_json())
         self.report_progress("table", 1.0)
 
-    @property
-    def limit(self) -> int:
-        """Steps after which an episode is truncated."""
-        spec = self.env.spec
-        return (spec.max_episode_steps if spec is not None else None) or DEFAULT_EPISODE_STEPS
+    def _world(self) -> TableWorld | SteppedWorld:
+        asked, env = self.experiment, self.env
+        seed = asked.seed
+        if asked.bins is not None:
+            method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
+            table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
+            return TableWorld(env, table, asked.num_envs or 64, seed)
+        try:
+            return TableWorld(env, tabulate(env, gamma=asked.gamma, seed=seed), asked.num_envs or 64, seed)
+        except (NotTabular, NotDiscrete) as error:
+            if not isinstance(env.action_space, spaces.Discrete):
+                raise
+            if not isinstance(asked.learner, TrajectoryLP):
+                raise type(error)(f"{error} Or learn from episodes alone, with TrajectoryLP.") from error
+            return SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""
@@ -94,77 +111,71 @@ class Loop:
     # Results of finished stages, read from the folder: so a run that continues sees what one in a single go sees.
 
     @cached_property
-    def expert_actions(self) -> Actions:
-        """(S,) the expert."""
-        return self.folder.load("expert.npz", _load_actions)
+    def expert(self) -> Any:
+        """The expert: (S,) actions or (S, A) of a table, else a policy; None where only its episodes are known."""
+        if self.experiment.dataset is not None and isinstance(self.world, SteppedWorld):
+            return None
+        return self.world.load(self.folder, "expert")
 
     @cached_property
-    def agent_actions(self) -> Actions:
-        """(S,) the retrained agent, deterministic."""
-        return self.folder.load("agent_policy.npz", _load_actions)
+    def agent(self) -> Any:
+        """The retrained agent, deterministic: (S,) actions of a table, else a policy."""
+        return self.world.load(self.folder, "agent")
 
     @cached_property
-    def learned(self) -> TabularReward:
+    def learned(self) -> TabularReward | LinearReward:
         """The recovered reward."""
-        return self.folder.load("reward.npz", TabularReward.load)
+        return self.folder.load("reward.npz", load_reward)
 
     @cached_property
-    def optimal_set(self) -> ActionSets:
-        """(S, A) the expert's optimal set: all optimal actions if it is optimal, else the actions it takes."""
-        mdp, reward = self.table.mdp, self.table.reward
-        best = policy_iteration(mdp, reward)
-        value = self.true_value(self.expert_actions)
-        tolerance = metrics.TIE_TOLERANCE * float(np.abs(reward.values).max())
-        if value >= float(mdp.d0 @ best.V) - tolerance:
-            return tied(best.Q, tolerance)
-        return support(self.expert_actions, mdp.n_states, mdp.n_actions)
+    def demonstrations(self) -> list[Episode]:
+        """The expert's episodes."""
+        asked = self.experiment
+        if asked.dataset is not None:
+            return list(read_minari(asked.dataset, env=self.env, root=asked.dataset_root))
+        return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.folder.path / "dataset"))
 
-    def _train(self, planner: Planner, reward: TabularReward, progress: Callable[[int, Policy], None] | None) -> Policy:
-        env = TabularVecEnv(
-            self.table.mdp, reward, num_envs=self.experiment.num_envs, max_episode_steps=self.limit,
-            states=self.table.states, seed=self.experiment.seed,
-        )  # fmt: skip
-        return planner.plan(env, gamma=self.experiment.gamma, seed=self.experiment.seed, progress=progress)
+    @cached_property
+    def certificate(self) -> dict[str, Any]:
+        """The content of certificate.json."""
+        return self.folder.load("certificate.json", read_json)
+
+    @cached_property
+    def folder_metrics(self) -> dict[str, Any]:
+        """The content of metrics.json."""
+        return self.folder.load("metrics.json", read_json)
 
     def _share(self, stage: str, planner: Planner) -> Callable[[int, Policy], None]:
         total = max(1, getattr(planner, "total_timesteps", 1))
         return lambda steps, _: self.report_progress(stage, min(1.0, steps / total))
 
     def _make_expert(self, folder: Path) -> dict[str, Any]:
-        planner = self.experiment.expert
-        policy = self._train(planner, self.table.reward, self._share("expert", planner))
-        _save_policy(policy, folder / "expert")
-        np.savez(folder / "expert.npz", actions=tabular_actions(policy, self.table.states))
-        return {"planner": type(planner).__name__, **_steps(policy)}
-
-    def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
-        """Episodes of a tabular policy in the environment: from the table where it holds every reward, else by stepping."""
-        table = self.table
-        if table.payments.entries is not None:
-            drawn = collect_from_table(
-                table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=self.limit
-            )
-            return list(drawn)
-        distribution = as_distribution(policy, table.mdp.n_states, table.mdp.n_actions)
-        actor = TabularPolicy(distribution, table.states, seed)
-        return list(collect(self.env, actor, n, seed=seed, max_episode_steps=self.limit))
-
-    @property
-    def uniform(self) -> np.ndarray:
-        """(S, A) the random policy."""
-        mdp = self.table.mdp
-        return np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
+        if self.experiment.dataset is None:
+            planner = self.experiment.expert or self.world.expert()
+            policy = self.world.train(planner, None, self._share("expert", planner))
+            self.world.keep(policy, folder, "expert")
+            return {"planner": type(planner).__name__, **_steps(policy)}
+        if isinstance(self.world, TableWorld):
+            table = self.world.table
+            seen = empirical_policy(self.demonstrations, table.states, table.mdp.n_actions)
+            most = np.where(seen.visited[:, None], np.eye(table.mdp.n_actions)[seen.counts.argmax(axis=1)], np.nan)
+            np.savez(folder / "expert.npz", actions=most)
+            return {"planner": "most frequent action of the dataset", "states_seen": int(seen.visited.sum())}
+        return {"planner": "unknown: the dataset's"}
 
     def _make_demonstrations(self, folder: Path) -> dict[str, Any]:
-        experiment = self.experiment
-        recorded = self.episodes(self.expert_actions, experiment.episodes, experiment.seed)
-        chance = self.episodes(self.uniform, experiment.eval_episodes, experiment.seed)
-        dataset_id = dataset_name(experiment.env_id)
+        asked = self.experiment
+        if asked.dataset is not None:
+            taken = sum(map(len, self.demonstrations))
+            return {"dataset_id": asked.dataset, "episodes": len(self.demonstrations), "steps_recorded": taken}
+        recorded = self.world.episodes(self.expert, asked.episodes, asked.seed)
+        chance = self.world.episodes(self.world.random, asked.eval_episodes, asked.seed)
+        dataset_id = dataset_name(str(asked.env_id))
         root = folder / "dataset"
         root.mkdir()
         write_minari(
-            recorded, dataset_id, self.env, root=root, algorithm=type(experiment.expert).__name__,
-            description=f"Expert demonstrations of {experiment.env_id}, gamma {experiment.gamma}, seed {experiment.seed}.",
+            recorded, dataset_id, self.env, root=root, algorithm=self.stage("expert")["planner"],
+            description=f"Expert demonstrations of {asked.env_id}, gamma {asked.gamma}, seed {asked.seed}.",
             code_permalink="scripts/recover_and_retrain.py of irl_gym",
             random_return=float(np.mean([episode.total_reward for episode in chance])),
             expert_return=float(np.mean([episode.total_reward for episode in recorded])),
@@ -173,48 +184,59 @@ class Loop:
             "dataset_id": dataset_id,
             "episodes": len(recorded),
             "environment_steps": sum(map(len, recorded)),
-            "seed": experiment.seed,
+            "seed": asked.seed,
         }
 
     def _make_reward(self, folder: Path) -> dict[str, Any]:
-        result = self.experiment.learner.fit(self.table.mdp, self.expert_actions)
+        result = self._learn(self.experiment.learner)
         result.reward.save(folder / "reward.npz")
         write_json(folder / "certificate.json", result.certificate.to_json())
-        return {"status": result.status.value, "objective": result.objective, "stats": dict(result.stats)}
+        learner = type(self.experiment.learner).__name__
+        return {"learner": learner, "status": result.status.value, "objective": result.objective, "stats": dict(result.stats)}
 
-    @cached_property
-    def transform(self) -> Transform:
-        """What is done to the learned reward before retraining."""
-        if not self.experiment.shaping:
+    def _learn(self, learner: Learner) -> IRLResult:
+        """Give a learner what it is of: a table and a policy, or a simulator and episodes."""
+        world = self.world
+        if isinstance(learner, TrajectoryLP):
+            table = world.table if isinstance(world, TableWorld) else None
+            solver = self.experiment.inner or world.expert()
+            result = learner.fit(Simulator(self.env, solver, world.gamma, table, world.num_envs), self.demonstrations)
+            return replace(result, stats={**result.stats, "inner": type(solver).__name__})
+        if not isinstance(world, TableWorld):
+            raise NotTabular(f"{self.env} has no table: expected one for {type(learner).__name__}. Use TrajectoryLP.")
+        if isinstance(learner, FeatureLP):
+            return learner.fit(world.table.mdp, self.expert, states=world.table.states)
+        return learner.fit(world.table.mdp, self.expert)
+
+    @property
+    def shaped(self) -> bool:
+        """Is the agent retrained on the expected advantage? That takes a table."""
+        return self.experiment.shaping and isinstance(self.world, TableWorld)
+
+    def transform(self, reward: TabularReward, mdp: Any) -> Transform:
+        """What is done to the learned reward before retraining; losses count up to the margin cap, or a typical loss."""
+        if not self.shaped:
             return Unchanged()
-        return ExpectedAdvantage(self.certificate["margin_cap"])
-
-    @cached_property
-    def certificate(self) -> dict[str, Any]:
-        """The content of certificate.json."""
-        return self.folder.load("certificate.json", read_json)
+        return ExpectedAdvantage(self.certificate.get("margin_cap") or typical_loss(reward, mdp))
 
     def _make_agent(self, folder: Path) -> dict[str, Any]:
-        planner = self.experiment.retrain
-        reward = self.transform.apply(self.learned, self.table.mdp)
+        world, reward = self.world, self.learned
+        planner = self.experiment.retrain or world.planner(shaped=self.shaped)
+        if isinstance(world, TableWorld):
+            plain = world.tabular(reward)
+            reward = self.transform(plain, world.table.mdp).apply(plain, world.table.mdp)
         share = self._share("agent", planner)
         curve: list[tuple[int, float]] = []
 
         def watch(steps: int, policy: Policy) -> None:
             share(steps, policy)
-            curve.append((steps, self.true_value(tabular_actions(policy, self.table.states))))
+            curve.append((steps, world.glance(policy)))
 
-        policy = self._train(planner, reward, watch)
-        actions = tabular_actions(policy, self.table.states)
-        _save_policy(policy, folder / "agent")
-        np.savez(folder / "agent_policy.npz", actions=actions)
+        policy = world.train(planner, reward, watch)
+        world.keep(policy, folder, "agent")
         with (folder / "learning_curve.csv").open("w", newline="") as file:
             csv.writer(file).writerows([("environment_steps", "true_value"), *curve])
         return {"planner": type(planner).__name__, **_steps(policy)}
-
-    def true_value(self, policy: Any) -> float:
-        """Exact discounted value of a tabular policy from d0 under the true reward."""
-        return metrics.policy_value(self.table.mdp, self.table.reward, policy)
 
     def _make_metrics(self, folder: Path) -> dict[str, Any]:
         content = evaluate(self)
@@ -226,17 +248,6 @@ class Loop:
         made.mkdir()
         figures.draw(self, made)
         return {}
-
-
-def _load_actions(path: Path) -> np.ndarray:
-    with np.load(path, allow_pickle=False) as archive:
-        return archive["actions"]
-
-
-def _save_policy(policy: Policy, stem: Path) -> None:
-    """Keep an agent in SB3's own zip; a table of actions needs no more than its npz."""
-    if isinstance(policy, Agent):
-        policy.save(stem.with_suffix(".zip"))
 
 
 def _steps(policy: Policy) -> dict[str, int]:

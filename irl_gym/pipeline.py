@@ -8,7 +8,6 @@ from typing import Any
 
 from irl_gym.experiment import Experiment
 from irl_gym.loop import STAGES, Loop, OnProgress
-from irl_gym.run_folder import read_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +17,7 @@ class Report:
     out: Path
     """The folder."""
     metrics: Mapping[str, Any]
-    """The content of metrics.json: policies, reward, training, table."""
+    """The content of metrics.json: policies, reward, training, demonstrations, and table, None where there is none."""
     certificate: Mapping[str, Any]
     """The content of certificate.json."""
     stages: Mapping[str, Mapping[str, Any]]
@@ -29,7 +28,8 @@ def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progr
     """Recover a reward from an expert, retrain an agent on it, and judge the agent under the true reward.
 
     Leaves under `out`: config.json, expert.npz, dataset/ (Minari), reward.npz, certificate.json, agent.zip,
-    agent_policy.npz, learning_curve.csv, metrics.json, figures/. A run that was killed continues after its last stage.
+    agent_policy.npz, learning_curve.csv, metrics.json, figures/. Where there is no table the expert is an expert.zip and there
+    is no agent_policy.npz; a dataset that was given is not copied. A run that was killed continues after its last stage.
 
     Args:
         experiment: what to do.
@@ -37,12 +37,12 @@ def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progr
         on_progress: called with a stage and the share of it that is done.
 
     Raises:
-        UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made.
+        UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made, and the learner needs one.
+        DatasetMissing, DatasetMismatch: no such dataset, or one of another environment.
         DegenerateExpert: no reward prefers the expert's actions.
         SolverTimeout, SolverFailed: a linear program without an answer.
         RunConflict: the folder holds another run.
     """
     loop = Loop(experiment, out, on_progress)
     stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-    content = loop.folder.load("metrics.json", read_json)
-    return Report(loop.folder.path, content, loop.certificate, stages)
+    return Report(loop.folder.path, loop.folder_metrics, loop.certificate, stages)

@@ -201,11 +201,19 @@ class SB3:
         """What SB3's constructor is given; a copy, since SB3 writes into `policy_kwargs`."""
         discrete = isinstance(env.observation_space, spaces.Discrete)
         settings = copy.deepcopy({**(DEFAULTS[self.algorithm] if discrete else {}), **self.hyperparameters})
-        if discrete and self.algorithm == "PPO":  # rollouts of 2048 steps, whatever the number of copies
+        many = discrete or isinstance(env, TabularVecEnv)
+        if many and self.algorithm == "PPO":  # rollouts of 2048 steps, whatever the number of copies
             copies = getattr(env, "num_envs", 1)
             settings.setdefault("n_steps", max(8, 2048 // copies))
             settings.setdefault("batch_size", _batch_size(settings["n_steps"] * copies))
         return settings
+
+
+FOR_CONTROL = SB3(
+    total_timesteps=100_000,
+    hyperparameters={"n_steps": 32, "batch_size": 256, "n_epochs": 20, "gae_lambda": 0.8, "learning_rate": 1e-3},
+)
+"""PPO for classic control, on 8 copies: the settings of rl-baselines3-zoo for CartPole, with a constant rate."""
 
 
 def _batch_size(rollout: int) -> int:

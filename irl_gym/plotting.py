@@ -181,6 +181,22 @@ def draw_learning_curve(
     return figure
 
 
+def draw_returns(points: Mapping[str, np.ndarray]) -> Figure:
+    """Episodes' returns under the learned reward against the true reward: a reward worth having puts them in the same order.
+
+    Args:
+        points: by policy, (N, 2) undiscounted true return and return under the learned reward.
+    """
+    figure = drawing.blank(6.4, 4.6)
+    axis = figure.add_subplot()
+    for (name, pairs), colour in zip(points.items(), cycle(drawing.SERIES), strict=False):
+        axis.scatter(pairs[:, 0], pairs[:, 1], s=18, color=colour, alpha=0.5, linewidths=0, label=name)
+    axis.legend(frameon=False)
+    axis.set(xlabel="true return", ylabel="return under the recovered reward", title="Episodes under both rewards")
+    drawing.plain(axis)
+    return figure
+
+
 def save_figure(figure: Figure, path: str | os.PathLike) -> None:
     """Write a png, svg or pdf beside, then rename. The same figure gives the same bytes: no date or version is written.
 

@@ -1,6 +1,7 @@
 """A run in a few tables a person reads, for the terminal."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.table import Table
@@ -25,18 +26,29 @@ def render(report: Report) -> Iterator[RenderableType]:
 def _policies(report: Report) -> Table:
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
     table.add_column("policy")
-    for heading in ("value", "score", "mean return (95 %)", "agreement"):
+    headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
+    known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
+    for heading in (*headings.values(), *(("agreement",) if known else ())):
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
         score = "-" if row["score"] is None else f"{row['score']:.3f}"
         interval = "{:.3f} ({:.3f} to {:.3f})".format(*(row[key] for key in ("mean_return", "return_low", "return_high")))
-        table.add_row(name, f"{row['value']:.4f}", score, interval, f"{row['agreement']:.1%}")
-    table.caption = (
-        "value: exact, discounted, from the start. score: random = 0, expert = 1. mean return: undiscounted, sampled. "
-        "agreement: share of states with one of the expert's actions."
-    )
+        agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
+        table.add_row(name, f"{row['value']:.4f}", score, interval, *agreement)
+    table.caption = f"value: {_how_valued(report)}. score: random = 0, expert = 1. mean return: undiscounted, sampled."
+    if known:
+        table.caption += " agreement: share of states with one of the expert's actions."
     table.caption_justify = "left"
     return table
+
+
+def _how_valued(report: Report) -> str:
+    """Where the values come from, in a few words."""
+    table = report.metrics["table"]
+    given = ", the expert's from its episodes" if report.metrics["demonstrations"]["given"] else ""
+    if table is None:
+        return "discounted, from the start, mean of episodes"
+    return f"{'exact' if table['exact'] else 'exact on the cells'}, discounted, from the start{given}"
 
 
 def _reward(report: Report) -> Table:
@@ -44,33 +56,85 @@ def _reward(report: Report) -> Table:
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
-    share = reward["worst_tie_regret_share"]
-    of_range = "" if share is None else f", {share:.2%} of expert - random"
-    table.add_row("expert optimal under it", "yes" if reward["expert_optimal"] else "NO: see certificate.json")
-    table.add_row("worst-tie regret", f"{abs(reward['worst_tie_regret']):.4g}{of_range}")
-    lambda_0 = "not computed" if reward["lambda_0"] is None else f"{reward['lambda_0']:.5g}"
-    table.add_row("lambda, lambda_0", f"{reward['l1']:.5g}, {lambda_0}")
-    cap = reward["margin_cap"]
-    table.add_row("margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}")
-    gap = reward["duality_gap"]
-    table.add_row("margins short of the most by", "unknown" if gap is None else f"at most {max(gap, 0.0):.1e}")
-    if reward["least_l1_norm"] is not None:
-        above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
-        table.add_row("||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins")
-    if reward["marginless_states"]:
-        mend = " Try --margin-cap auto." if cap is None else ""
-        table.add_row("states where it leaves ties", f"{reward['marginless_states']}: the expert has no margin there.{mend}")
-    if reward["inseparable_states"]:
-        table.add_row(
-            "states it cannot settle",
-            f"{reward['inseparable_states']}: there an action has the expert's successors. Try --reward-on state-action.",
-        )
+    for what, told in _told_of_reward(reward):
+        table.add_row(what, told)
     table.caption = (
-        "worst-tie regret: what the worst policy greedy under the reward loses. lambda: price of ||R||_1; above lambda_0 R is "
-        "0. margin: how much better the expert's action is than another."
-    )
+        "worst-tie regret: what the worst policy greedy under the reward loses. " if "worst_tie_regret" in reward else ""
+    ) + _CAPTIONS[reward["learner"]]
     table.caption_justify = "left"
     return table
+
+
+_CAPTIONS = {
+    "FiniteLP": "lambda: price of ||R||_1; above lambda_0 R is 0. margin: how much better the expert's action is than another.",
+    "FeatureLP": "sample: the states that the program compares actions in. rank: directions of alpha they say anything about.",
+    "TrajectoryLP": (
+        "distance: ||V expert - V policy||_1 in the features; no reward with |alpha_i| <= 1 tells the best round's policy from "
+        "the expert by more."
+    ),
+}
+
+
+def _told_of_reward(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is said of the reward, line by line: what all learners know, then what each one's certificate knows."""
+    if not reward["status"].startswith("Optimal"):
+        yield "status", reward["status"]
+    yield "expert optimal under it", "yes" if reward["expert_optimal"] else _why_not(reward)
+    if "worst_tie_regret" in reward:
+        share = reward["worst_tie_regret_share"]
+        of_range = "" if share is None else f", {share:.2%} of expert - random"
+        yield "worst-tie regret", f"{_zero(reward['worst_tie_regret']):.4g}{of_range}"
+    yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
+        reward
+    )
+
+
+def _zero(value: float) -> float:
+    """A loss, without the sign of rounding."""
+    return 0.0 if abs(value) < 1e-9 else value
+
+
+def _why_not(reward: Mapping[str, Any]) -> str:
+    if "violated_states" in reward:
+        return f"not in {reward['violated_states']:,} states, by {reward['worst_violation']:.3g} at most"
+    if "regret" in reward:
+        return f"no: the policy planned for it gains {reward['regret']:.3g} +- {reward['regret_error']:.2g} over the expert"
+    return "NO: see certificate.json"
+
+
+def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    lambda_0 = "not computed" if reward["lambda_0"] is None else f"{reward['lambda_0']:.5g}"
+    yield "lambda, lambda_0", f"{reward['l1']:.5g}, {lambda_0}"
+    cap = reward["margin_cap"]
+    yield "margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}"
+    gap = reward["duality_gap"]
+    yield "margins short of the most by", "unknown" if gap is None else f"at most {max(gap, 0.0):.1e}"
+    if reward["least_l1_norm"] is not None:
+        above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
+        yield "||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins"
+    if reward["marginless_states"]:
+        mend = " Try --margin-cap auto." if cap is None else ""
+        yield "states where it leaves ties", f"{reward['marginless_states']}: the expert has no margin there.{mend}"
+    if reward["inseparable_states"]:
+        mend = "there an action has the expert's successors. Try --reward-on state-action."
+        yield "states it cannot settle", f"{reward['inseparable_states']}: {mend}"
+
+
+def _told_feature(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "features", f"{reward['n_features']}, the rows have rank {reward['rank']}"
+    yield "sample", f"{reward['states']:,} states; {reward['trivial']:,} more have nothing to compare"
+    cap, gap = reward["margin_cap"], max(reward["duality_gap"], 0.0)
+    yield "margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}"
+    yield "objective", f"{reward['objective']:.5g}, at most {gap:.1e} below the optimum"
+    if not reward["expressible"]:
+        yield "expressible", "NO: no reward in the span of the features makes the expert optimal. Try more --features"
+
+
+def _told_trajectory(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "features", f"{reward['n_features']}, the rows have rank {reward['rank']}"
+    yield "best round", f"{reward['best_round']}, by its policy's distance to the expert"
+    yield "distance", f"{reward['distance']:.4g}, of which {reward['distance_error']:.2g} is noise"
+    yield "trajectories", f"cut after {reward['horizon']} steps, which changes a value by {reward['truncation']:.2g} at most"
 
 
 def _stages(report: Report) -> Table:

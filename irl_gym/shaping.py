@@ -113,3 +113,15 @@ class ExpectedAdvantage:
             advantage = np.maximum(advantage, -self.clip) / self.clip
         advantage[mdp.terminal] = 0.0
         return TabularReward(advantage, {**reward.note, "shaped": "expected advantage"})
+
+
+def typical_loss(reward: TabularReward, mdp: TabularMDP) -> float | None:
+    """A clip for ExpectedAdvantage where no margin cap is known: the median, over reachable states, of the smallest loss.
+
+    The smallest loss of a state is what its best action that is not optimal loses; None where no action loses anything. Any
+    clip keeps the optimal policies; one of this size lets an agent that learns from samples see half of the losses whole.
+    """
+    loss = -ExpectedAdvantage().apply(reward, mdp).values[mdp.reachable & ~mdp.terminal]
+    least = np.where(loss > 0, loss, np.inf).min(axis=1)
+    least = least[np.isfinite(least)]
+    return float(np.median(least)) if least.size else None

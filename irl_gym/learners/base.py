@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
@@ -34,17 +34,21 @@ class Proof(Protocol):
         ...
 
 
+AnyReward = TypeVar("AnyReward", TabularReward, LinearReward)
+AnyProof = TypeVar("AnyProof", bound=Proof)
+
+
 @dataclass(frozen=True, eq=False)
-class IRLResult:
+class IRLResult(Generic[AnyReward, AnyProof]):
     """A learned reward and what it proves."""
 
-    reward: TabularReward | LinearReward
+    reward: AnyReward
     """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
     status: Status
     """What became of the program, in a sentence."""
     objective: float
     """The program's objective, recomputed from the reward."""
-    certificate: Any
+    certificate: AnyProof
     """What the reward proves: a Certificate of FiniteLP, or another `Proof`."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, seconds, iterations, program by program."""
@@ -56,6 +60,6 @@ class IRLResult:
 class Learner(Protocol):
     """Turns a world without reward and an expert into a reward."""
 
-    def fit(self, world: Any, expert: Any, /) -> IRLResult:
+    def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:
         """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
         ...

@@ -6,6 +6,11 @@ R = sum_i alpha_i phi_i (8), so V = sum_i alpha_i V_i (9), V_i the value of the 
 The features may express no reward that makes the expert optimal, so (10) is not a constraint: what violates it counts twice.
 States without another action of other successors are not counted.
 
+`margin_cap=tau` Departs: each margin counts up to tau only. The paper's sum buys one state's margin at the price of others',
+and pays for violations with large margins elsewhere, also where the features express a reward that makes the expert optimal.
+`margin_cap="auto"`: tau is half of the largest margin that all rows can have at once, where there is one: it is then attained
+by all, and the expert is strictly optimal in S_0. Where there is none, a tenth of the mean margin under the paper's reward.
+
 Departs: an action that the expert takes too, when it takes several, has to be as good; its rows d and -d both go into the sum,
 where they cost (penalty - 1) |d|. The certificate judges all reachable states of a table, not the sample only.
 Axes: S states, A actions, K features.
@@ -13,7 +18,7 @@ Axes: S states, A actions, K features.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,7 +30,7 @@ from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
 from irl_gym.learners.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
-from irl_gym.learners.weights import Weights, best_weights, most_agreement
+from irl_gym.learners.weights import Rows, Weights, best_weights, most_agreement, uniform_margin
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import Policy
@@ -52,6 +57,8 @@ class FeatureLP:
     (m, d) states of a generative model; None for all."""
     penalty: float = 2.0
     """Slope of p below 0, at least 1: the paper's 2."""
+    margin_cap: float | Literal["auto"] | None = None
+    """tau > 0, the cap on margins; "auto" chooses it; None is the paper's program."""
     l1: float = 0.0
     """Price of ||alpha||_1, at least 0."""
     samples: int = 1
@@ -69,6 +76,8 @@ class FeatureLP:
         object.__setattr__(self, "features", as_features(self.features))
         checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
         checked_number("l1", self.l1, "a number of at least 0", least=0)
+        if self.margin_cap is not None and self.margin_cap != "auto":
+            checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
         checked_number("samples", self.samples, "a whole number of at least 1", least=1, whole=True)
         checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
         if self.horizon is not None:
@@ -79,7 +88,9 @@ class FeatureLP:
             raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")
         check_solving(self.solver, self.time_limit)
 
-    def fit(self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None) -> IRLResult:
+    def fit(
+        self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None
+    ) -> IRLResult[LinearReward, FeatureCertificate]:
         """Learn the weights of a reward under which the expert is optimal, or violates (10) least.
 
         Args:
@@ -112,7 +123,7 @@ class FeatureLP:
         """The features, as a map."""
         return as_features(self.features)
 
-    def _fit_table(self, mdp: TabularMDP, expert: Any, states: States | None) -> IRLResult:
+    def _fit_table(self, mdp: TabularMDP, expert: Any, states: States | None) -> IRLResult[LinearReward, FeatureCertificate]:
         size, decode = (mdp.n_states, _rows) if states is None else (states.n_states, states.decode_batch)
         if size != mdp.n_states:
             raise InvalidParameter(f"states has {size} states: expected {mdp.n_states}, the table's. Is it another table's?")
@@ -123,14 +134,15 @@ class FeatureLP:
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted)
-        weights, status, expressible = self._solve(found)
+        solved = self._solve(found)
+        weights = solved.weights
         reward = self._reward(weights)
         values = reward.tabular(mdp.n_states if states is None else states).values
         judged = judge_table(mdp, expert, known, values, discounted)
-        certificate = self._certificate(found, weights, judged, expressible, None)
-        return IRLResult(reward, status, certificate.objective, certificate, self._stats(weights, found))
+        certificate = self._certificate(found, solved, judged, None)
+        return IRLResult(reward, solved.status, certificate.objective, certificate, self._stats(weights, found))
 
-    def _fit_model(self, model: GenerativeModel, expert: Policy) -> IRLResult:
+    def _fit_model(self, model: GenerativeModel, expert: Policy) -> IRLResult[LinearReward, FeatureCertificate]:
         if not isinstance(expert, Policy):
             raise InvalidPolicy(
                 f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
@@ -138,7 +150,8 @@ class FeatureLP:
         S_0 = self._states_of(model)
         horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)
         found = rows_of_model(model, expert, self.phi, S_0, samples=int(self.samples), horizon=horizon, seed=int(self.seed))
-        weights, status, expressible = self._solve(found)
+        solved = self._solve(found)
+        weights = solved.weights
         error = None
         if found.batches is not None:
             spread = (found.batches @ weights.alpha).std(axis=0, ddof=1) / np.sqrt(len(found.batches))
@@ -147,9 +160,11 @@ class FeatureLP:
         margin[found.states] = found.rows.least(weights.alpha)
         tolerance = 1e-9 * found.rows.scale + 2 * (error or 0.0)
         judged = Judged(margin, np.zeros(len(S_0)), tolerance, bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING))
-        certificate = self._certificate(found, weights, judged, expressible, error)
+        certificate = self._certificate(found, solved, judged, error)
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
-        return IRLResult(self._reward(weights), status, certificate.objective, certificate, self._stats(weights, found) | extra)
+        return IRLResult(
+            self._reward(weights), solved.status, certificate.objective, certificate, self._stats(weights, found) | extra
+        )
 
     def _states_of(self, model: GenerativeModel) -> np.ndarray:
         """(m, d) S_0 of a generative model."""
@@ -174,30 +189,44 @@ class FeatureLP:
             )
         return states
 
-    def _solve(self, found: FeatureRows) -> tuple[Weights, Status, bool]:
+    def _solve(self, found: FeatureRows) -> "_Solved":
         """The weights, what became of them, and whether some reward of the span satisfies (10)."""
-        rows, solving = found.rows, {"solver": self.solver, "time_limit": self.time_limit}
-        weights = best_weights(rows, slope=float(self.penalty), l1=float(self.l1), **solving)
-        least, unit = rows.least(weights.alpha), NOTHING * rows.scale
+        rows, unit = found.rows, NOTHING * found.rows.scale
+        solving: dict[str, Any] = {"solver": self.solver, "time_limit": self.time_limit}
+        program: dict[str, Any] = {"slope": float(self.penalty), "l1": float(self.l1)}
+        cap = self._cap(rows, program, solving)
+        program["cap"] = np.inf if cap is None else cap
+        weights = best_weights(rows, **program, **solving)
+        least = rows.least(weights.alpha)
         expressible = bool(least.min() >= -unit and least.max() > unit)
         if not expressible:
             expressible = most_agreement(rows, **solving) > NOTHING
-        if rows.bound(weights.y, slope=float(self.penalty), l1=float(self.l1)) <= unit * rows.n_groups:
+        bound = rows.bound(weights.y, **program)
+        if bound <= unit * rows.n_groups:
             weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
         status = weights.answer.status
         if not expressible:
             status = Status.INEXPRESSIBLE
         elif not weights.alpha.any():
             status = Status.ZERO_WEIGHTS
-        return weights, status, expressible
+        return _Solved(weights, status, expressible, cap, rows.objective(weights.alpha, **program), bound)
+
+    def _cap(self, rows: Rows, program: dict[str, Any], solving: dict[str, Any]) -> float | None:
+        """tau; None for no cap."""
+        if self.margin_cap != "auto":
+            return None if self.margin_cap is None else float(self.margin_cap)
+        uniform = uniform_margin(rows, **solving)
+        if uniform > 0:
+            return uniform / 2
+        least = rows.least(best_weights(rows, **program, **solving).alpha)
+        mean = float(np.maximum(least, 0.0).mean())
+        return mean / 10 if mean > NOTHING * rows.scale else None
 
     def _reward(self, weights: Weights) -> LinearReward:
         return LinearReward(weights.alpha, self.phi, {"learner": "FeatureLP", "scaling": self.phi.scaling})
 
-    def _certificate(
-        self, found: FeatureRows, weights: Weights, judged: Judged, expressible: bool, error: float | None
-    ) -> FeatureCertificate:
-        rows, slope, l1 = found.rows, float(self.penalty), float(self.l1)
+    def _certificate(self, found: FeatureRows, solved: "_Solved", judged: Judged, error: float | None) -> FeatureCertificate:
+        rows, alpha = found.rows, solved.weights.alpha
         short = np.maximum(np.nan_to_num(-judged.margin), judged.tied)
         violated = np.flatnonzero(short > judged.tolerance)
         return FeatureCertificate(
@@ -205,17 +234,18 @@ class FeatureLP:
             worst_violation=float(np.maximum(short, 0.0).max(initial=0.0)),
             margin=judged.margin,
             violated=violated,
-            objective=rows.objective(weights.alpha, slope=slope, l1=l1),
-            dual_bound=rows.bound(weights.y, slope=slope, l1=l1),
-            penalty=slope,
-            l1=l1,
-            alpha_l1_norm=float(np.abs(weights.alpha).sum()),
+            objective=solved.objective,
+            dual_bound=solved.bound,
+            penalty=float(self.penalty),
+            margin_cap=solved.cap,
+            l1=float(self.l1),
+            alpha_l1_norm=float(np.abs(alpha).sum()),
             states=int(np.unique(found.states).size),
             trivial=found.trivial,
             rank=rows.rank,
             n_features=rows.d.shape[1],
-            expressible=expressible,
-            zero=not weights.alpha.any(),
+            expressible=solved.expressible,
+            zero=not alpha.any(),
             constant=judged.constant,
             standard_error=error,
         )
@@ -231,15 +261,27 @@ class FeatureLP:
         return {"programs": {"weights": program | {"status": answer.status.value}}, "rows": len(found.rows.groups)}
 
 
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The program's answer, and what is said of it."""
+
+    weights: Weights
+    status: Status
+    expressible: bool
+    cap: float | None
+    objective: float
+    bound: float
+
+
 def _completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
     """An expert with random actions where nothing is known of it, and (S,) where something is."""
     array = np.asarray(expert)
     if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
         return expert, np.ones(n_states, dtype=bool)
-    unknown = np.isnan(array).all(axis=1)
+    unknown = np.asarray(np.isnan(array).all(axis=1))
     if unknown.all():
         raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
-    return np.where(unknown[:, None], 1 / array.shape[1], array), ~unknown
+    return np.where(unknown[:, None], 1 / array.shape[1], array), np.logical_not(unknown)
 
 
 def _rows(rows: np.ndarray) -> np.ndarray:

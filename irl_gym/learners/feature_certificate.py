@@ -35,6 +35,8 @@ class FeatureCertificate:
     """No alpha has a larger objective."""
     penalty: float
     """Slope of p below 0."""
+    margin_cap: float | None
+    """Cap tau on margins; None in the paper's program."""
     l1: float
     """Price of ||alpha||_1."""
     alpha_l1_norm: float

@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym.certificate import certify, least_per_state, row_margins
+from irl_gym.certificate import Certificate, certify, least_per_state, row_margins
 from irl_gym.checks import checked_number
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidMDP, InvalidParameter, SolverFailed, SolverInfeasible
@@ -73,7 +73,7 @@ class FiniteLP:
         if self.reward_on not in ("state", "state-action"):
             raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
 
-    def fit(self, mdp: TabularMDP, expert: Any) -> IRLResult:
+    def fit(self, mdp: TabularMDP, expert: Any) -> IRLResult[TabularReward, Certificate]:
         """Learn a reward under which the expert is optimal.
 
         Args:
@@ -222,7 +222,7 @@ class _Task:
             f"{self.rows.size} reachable states prefers its actions. Is the policy optimal for any reward at all?{mend}"
         )
 
-    def result(self, solved: Solved, **proof: Any) -> IRLResult:
+    def result(self, solved: Solved, **proof: Any) -> IRLResult[TabularReward, Certificate]:
         values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R

@@ -116,7 +116,7 @@ class TrajectoryLP:
         """The features, as a map."""
         return as_features(self.features)
 
-    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult:
+    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult[LinearReward, TrajectoryCertificate]:
         """The best round: the one whose policy is nearest to the expert in the features.
 
         Stops after `max_rounds`, when `patience` rounds have not come nearer, or when a policy cannot be told from the expert:
@@ -131,7 +131,7 @@ class TrajectoryLP:
             InvalidFeatures: what the features give is not (N, K) finite numbers.
             SolverTimeout, SolverFailed: no answer.
         """
-        results: list[IRLResult] = []
+        results: list[IRLResult[LinearReward, TrajectoryCertificate]] = []
         best = 0
         for number, result in enumerate(self.iterate(world, episodes)):
             results.append(result)
@@ -144,7 +144,7 @@ class TrajectoryLP:
         stats = {**results[best].stats, "best_round": best + 1, "best_by": "distance", "rounds": history}
         return replace(results[best], stats=stats)
 
-    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult]:
+    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult[LinearReward, TrajectoryCertificate]]:
         """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
         expert = list(episodes)
         horizon, r_unit = self._horizon(world.gamma, expert), self._largest(expert)

@@ -3,15 +3,16 @@
     unknowns    alpha (K,), |alpha_i| <= 1
                 u, v (G,) >= 0         what each group's least row has above and below 0
     maximise    sum_g u_g - slope v_g - l1 ||alpha||_1
-    subject to  u_g - v_g <= d_r . alpha      for each row r of group g
-At the optimum u_g - v_g = min_r d_r . alpha, and u_g - slope v_g = p(that), with p(x) = x for x >= 0 and slope x below.
+    subject to  u_g - v_g <= d_r . alpha      for each row r of group g,      u_g <= cap
+At the optimum u_g - slope v_g = p(min_r d_r . alpha), with p(x) = slope x below 0, x between 0 and cap, and cap above.
 In section 4 a group is a state and its rows are its actions; in section 5 a group is a policy found so far, with one row.
 
-`bound` is Lagrange's: for *any* y >= 0 with w_g = sum of y over group g between 1 and slope,
-    sum_i (|sum_r y_r d_ri| - l1)+
+`bound` is Lagrange's: for *any* y >= 0 with w_g, the sum of y over group g, at most slope (and at least 1 without a cap),
+    sum_g cap (1 - w_g)+  +  sum_i (|sum_r y_r d_ri| - l1)+
 is above every objective, whatever the solver did. Axes: K features, n rows, G groups.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,27 +64,33 @@ class Rows:
         """(G,) min over the rows of each group of d . alpha."""
         return np.minimum.reduceat(self.d @ alpha, self.starts) if self.groups.size else np.zeros(0)
 
-    def active(self, alpha: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
+    def active(self, alpha: np.ndarray, slope: float, cap: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(G,) the row that is least in each group, and the slope of p there."""
         values = self.d @ alpha
         chosen = np.lexsort((values, self.groups))[self.starts]
-        return chosen, np.where(values[chosen] < 0, slope, 1.0)
+        return chosen, np.select([values[chosen] < 0, values[chosen] < cap], [slope, 1.0], 0.0)
 
-    def objective(self, alpha: np.ndarray, *, slope: float, l1: float) -> float:
-        """sum_g p(least) - l1 ||alpha||_1."""
+    def terms(self, alpha: np.ndarray, slope: float, cap: float = np.inf) -> np.ndarray:
+        """(G,) p(least)."""
         least = self.least(alpha)
-        return float(np.where(least < 0, slope * least, least).sum()) - l1 * float(np.abs(alpha).sum())
+        return np.minimum(np.where(least < 0, slope * least, least), cap)
 
-    def bound(self, y: np.ndarray, *, slope: float, l1: float) -> float:
+    def objective(self, alpha: np.ndarray, *, slope: float, l1: float, cap: float = np.inf) -> float:
+        """sum_g p(least) - l1 ||alpha||_1."""
+        return float(self.terms(alpha, slope, cap).sum()) - l1 * float(np.abs(alpha).sum())
+
+    def bound(self, y: np.ndarray, *, slope: float, l1: float, cap: float = np.inf) -> float:
         """Lagrange's bound above every objective, from duals (n,) of any quality."""
         y = np.maximum(np.nan_to_num(y), 0.0)
         weight = np.bincount(self.groups, y, minlength=self.n_groups)
         size = np.bincount(self.groups, minlength=self.n_groups)
-        empty = weight <= 0
+        empty = (weight <= 0) & np.isinf(cap)
         y = np.where(empty[self.groups], 1 / size[self.groups], y)
         weight = np.where(empty, 1.0, weight)
-        y = y * (np.clip(weight, 1.0, slope) / weight)[self.groups]
-        return float(np.maximum(np.abs(y @ self.d) - l1, 0.0).sum())
+        least = 1.0 if np.isinf(cap) else 0.0
+        y = y * (np.clip(weight, least, slope) / np.where(weight > 0, weight, 1.0))[self.groups]
+        slack = 0.0 if np.isinf(cap) else cap * float(np.maximum(1 - weight, 0.0).sum())
+        return slack + float(np.maximum(np.abs(y @ self.d) - l1, 0.0).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +110,13 @@ SAMPLE = 2_000
 
 
 def best_weights(
-    rows: Rows, *, slope: float, l1: float, solver: SolverName = "auto", time_limit: float | None = None
+    rows: Rows,
+    *,
+    slope: float,
+    l1: float,
+    cap: float = np.inf,
+    solver: SolverName = "auto",
+    time_limit: float | None = None,
 ) -> Weights:
     """Solve the program.
 
@@ -115,20 +128,20 @@ def best_weights(
     Raises:
         SolverTimeout, SolverFailed: no answer.
     """
-    solving = _Solving(slope, l1, solver, time_limit)
+    solving = _Solving(slope, l1, cap, solver, time_limit)
     if rows.n_groups <= SAMPLE:
         return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(rows.d.shape[1]), solving)
     part = np.zeros(rows.n_groups, dtype=bool)
     part[np.linspace(0, rows.n_groups - 1, SAMPLE).astype(int)] = True
     alpha = _solve_part(rows, part, np.zeros(rows.d.shape[1]), solving).alpha
-    part = _kinks(rows, alpha)
-    active, weight = rows.active(alpha, slope)
+    part = _kinks(rows, alpha, cap)
+    active, weight = rows.active(alpha, slope, cap)
+    most = np.where(weight == 0, cap, 0.0) if np.isfinite(cap) else np.zeros(rows.n_groups)
     while True:
         linear = (weight * ~part) @ rows.d[active]
         found = _solve_part(rows, part, linear, solving)
-        least = rows.least(found.alpha)
-        model = weight * (rows.d[active] @ found.alpha)
-        missing = ~part & (model > np.where(least < 0, slope * least, least) + 1e-9 * rows.scale)
+        model = most + weight * (rows.d[active] @ found.alpha)
+        missing = ~part & (model > rows.terms(found.alpha, slope, cap) + 1e-9 * rows.scale)
         if not missing.any():
             found.y[active[~part]] = weight[~part]
             return found
@@ -139,17 +152,18 @@ def best_weights(
 class _Solving:
     slope: float
     l1: float
+    cap: float
     solver: SolverName
     time_limit: float | None
 
 
-def _kinks(rows: Rows, alpha: np.ndarray) -> np.ndarray:
-    """(G,) the groups nearest to a kink at alpha: where the least row is near 0, or near the next."""
+def _kinks(rows: Rows, alpha: np.ndarray, cap: float) -> np.ndarray:
+    """(G,) the groups nearest to a kink at alpha: where the least row is near 0 or the cap, or near the next."""
     least, chosen = rows.least(alpha), rows.active(alpha, 1.0)[0]
     above = rows.d @ alpha - least[rows.groups]
     above[chosen] = np.inf
     second = np.minimum.reduceat(above, rows.starts)
-    near = np.minimum(np.abs(least), second)
+    near = np.minimum.reduce([np.abs(least), np.abs(least - cap), second])
     mask = np.zeros(rows.n_groups, dtype=bool)
     mask[np.argsort(near, kind="stable")[:SAMPLE]] = True
     return mask
@@ -166,6 +180,8 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solv
     above: Any = picks @ (u - v) <= d @ alpha
     objective = cp.sum(u) - solving.slope * cp.sum(v) + (linear / rows.scale) @ alpha
     constraints: list[Any] = [above, alpha <= 1, alpha >= -1]
+    if np.isfinite(solving.cap):
+        constraints.append(u <= solving.cap / rows.scale)
     if solving.l1:
         size = cp.Variable(alpha.size)
         constraints += [size >= alpha, size >= -alpha]
@@ -188,27 +204,62 @@ def most_agreement(rows: Rows, *, solver: SolverName = "auto", time_limit: float
     """
     d = rows.d / rows.scale
     mean = d.mean(axis=0)
+
+    def solve_part(part: np.ndarray) -> tuple[float, float, np.ndarray]:
+        alpha = cp.Variable(len(mean))
+        satisfied: Any = d[part] @ alpha >= 0
+        problem = cp.Problem(cp.Maximize(mean @ alpha), [satisfied, alpha <= 1, alpha >= -1])
+        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
+        y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
+        return float(np.abs(mean + y @ d[part]).sum()), 0.0, _value(alpha)
+
+    return _generate(d, solve_part)
+
+
+def uniform_margin(rows: Rows, *, solver: SolverName = "auto", time_limit: float | None = None) -> float:
+    """The largest margin that every row can have at once, 0 if there is none; rows that are 0 themselves are left out.
+
+    Raises:
+        SolverTimeout, SolverFailed: no answer.
+    """
+    d = rows.d / rows.scale
+    d = d[np.abs(d).max(axis=1) > ROUNDING]
+    if not len(d):
+        return 0.0
+
+    def solve_part(part: np.ndarray) -> tuple[float, float, np.ndarray]:
+        alpha, margin = cp.Variable(d.shape[1]), cp.Variable()
+        problem = cp.Problem(cp.Maximize(margin), [d[part] @ alpha >= margin, alpha <= 1, alpha >= -1])
+        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
+        return float(np.asarray(margin.value)), float(np.asarray(margin.value)), _value(alpha)
+
+    found = _generate(d, solve_part)
+    return found * rows.scale if found > UNIFORM else 0.0
+
+
+UNIFORM = 1e-7
+"""A uniform margin below this, over the size of the rows, is the solvers' rounding."""
+
+
+def _generate(d: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:
+    """The value of the last of a series of relaxations, each with the rows put in that the answer before violates most.
+
+    Args:
+        d: (n, K).
+        solve_part: (n,) rows that are in, to the program's value, what every row has to reach, and alpha.
+    """
     part = np.zeros(len(d), dtype=bool)
-    alpha, bound = np.sign(mean), float(np.abs(mean).sum())
+    values, least, value = d @ np.sign(d.mean(axis=0)), np.inf, 0.0
     while True:
-        values = np.where(part, np.inf, d @ alpha)
-        worst = np.argsort(values, kind="stable")[:SAMPLE]
-        worst = worst[values[worst] < -1e-9]
+        worst = np.argsort(np.where(part, np.inf, values), kind="stable")[:SAMPLE]
+        worst = worst[(values[worst] < least - 1e-9) & ~part[worst]]
         if not worst.size:
-            return bound
+            return value
         part[worst] = True
-        bound, alpha = _agreement_of(d[part], mean, solver, time_limit)
-        if bound <= 1e-9:
-            return bound
-
-
-def _agreement_of(d: np.ndarray, mean: np.ndarray, solver: SolverName, time_limit: float | None) -> tuple[float, np.ndarray]:
-    alpha = cp.Variable(len(mean))
-    satisfied: Any = d @ alpha >= 0
-    problem = cp.Problem(cp.Maximize(mean @ alpha), [satisfied, alpha <= 1, alpha >= -1])
-    solve(problem, rows=len(d), solver=solver, time_limit=time_limit)
-    y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
-    return float(np.abs(mean + y @ d).sum()), _value(alpha)
+        value, least, alpha = solve_part(part)
+        if value <= 1e-9:
+            return value
+        values = d @ alpha
 
 
 def _value(variable: cp.Variable) -> np.ndarray:

@@ -1,0 +1,90 @@
+"""What the loop's command line asks for, and the experiment that it stands for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from irl_gym.choices import FeatureName, LearnerName, PlannerName, environment_of, features_named, planner_named, steps_only
+from irl_gym.experiment import Experiment, parse_keywords
+from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.trajectory import TrajectoryLP
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Recover a reward from an expert, retrain an agent that sees only that reward, and judge it under the true one."""
+
+    env_id: str | None = None
+    """A registered environment; module:id for one of another package. The default is the dataset's, or FrozenLake-v1."""
+    env_kwargs: tuple[str, ...] = ()
+    """What the environment is made with: name=value ..., or one json object."""
+    gamma: float = 0.99
+    """Discount, between 0 and 1."""
+    bins: tuple[int, ...] = ()
+    """Make a table of continuous states: cells along each coordinate, or one number for all."""
+    samples: int = 0
+    """Points drawn in each cell, whose steps are counted; 0 for the step from its centre, shared between neighbours."""
+    dataset: str | None = None
+    """Learn from this Minari dataset, in place of an expert's policy (feature-lp, trajectory-lp)."""
+    dataset_root: str | None = None
+    """Minari's root folder."""
+    expert: PlannerName | None = None
+    """Who demonstrates: exact planning on a table, or an SB3 agent trained on the true reward."""
+    episodes: int = 500
+    """Demonstrations recorded; only trajectory-lp learns from them, the others from the expert's whole policy."""
+    learner: LearnerName = "finite-lp"
+    """Ng & Russell's section 3 (finite-lp), 4 (feature-lp) or 5 (trajectory-lp)."""
+    l1: float | Literal["auto"] = 0.0
+    """Price of ||R||_1, of ||alpha||_1 with features: a number, or auto for just below lambda_0 (finite-lp)."""
+    margin_cap: float | Literal["auto", "none"] = "auto"
+    """finite-lp and feature-lp. Cap on margins: a number, auto, or none for the paper's own program."""
+    reward_on: Literal["state", "state-action"] = "state"
+    """finite-lp. What the recovered reward is a function of."""
+    features: FeatureName = "auto"
+    """feature-lp and trajectory-lp. auto is one-hot for discrete observations, radial for others."""
+    size: int | None = None
+    """Of the features: centres along each coordinate, Fourier order, or degree."""
+    coordinates: tuple[int, ...] = ()
+    """Values of each coordinate that a discrete observation is made of, such as 5 5 5 4 for Taxi."""
+    sample: int | None = None
+    """feature-lp. States in S_0, drawn at random; the default is all."""
+    rounds: int = 30
+    """trajectory-lp. At most."""
+    inner: PlannerName | None = None
+    """trajectory-lp. Who solves for each reward tried."""
+    shaping: bool = True
+    """Retrain on the expected advantage under the recovered reward, computed from the table; else on the reward as it is."""
+    retrain: PlannerName = "ppo"
+    """Who learns from the recovered reward."""
+    total_timesteps: int | None = None
+    """Environment steps of each SB3 agent; the default is 400,000 on tables, 100,000 on environments that are stepped."""
+    seed: int = 0
+    """Of everything that is drawn."""
+    out: Path | None = None
+    """Where the run is kept, and continued if it was killed. The default is a folder of its own under runs/."""
+
+    def experiment(self) -> Experiment:
+        """What the arguments ask for."""
+        env_id = self.env_id or (None if self.dataset else "FrozenLake-v1")
+        env_kwargs = parse_keywords(self.env_kwargs)
+        control, cap = False, None if self.margin_cap == "none" else self.margin_cap
+        if self.learner == "finite-lp":
+            learner: Any = FiniteLP(l1=self.l1, margin_cap=cap, reward_on=self.reward_on, report_lambda_0=True)
+        else:
+            env = environment_of(env_id, env_kwargs, self.dataset, self.dataset_root)
+            control = steps_only(env) and not self.bins
+            phi = features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
+            l1: Any = self.l1
+            if self.learner == "feature-lp":
+                learner = FeatureLP(phi, self.sample, margin_cap=cap, l1=l1, seed=self.seed)
+            else:
+                learner = TrajectoryLP(phi, l1=l1, max_rounds=self.rounds, seed=self.seed)
+        steps, shaped = self.total_timesteps, self.shaping and not control
+        bins = self.bins[0] if len(self.bins) == 1 else self.bins or None
+        return Experiment(
+            env_id, self.gamma, env_kwargs, bins, self.samples, self.dataset, self.dataset_root,
+            expert=planner_named(self.expert, steps, control=control), episodes=self.episodes,
+            learner=learner, inner=planner_named(self.inner, steps, control=control), shaping=self.shaping,
+            retrain=planner_named(self.retrain, steps, control=control, advantages=shaped), seed=self.seed,
+        )  # fmt: skip

@@ -1,0 +1,133 @@
+"""What the names on a command line stand for: environments, planners and features."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.coordinates import coordinates_of
+from irl_gym.datasets import load_minari
+from irl_gym.errors import DatasetMismatch, InvalidFeatures, NotSettable
+from irl_gym.features import FeatureMap, OneHot, Unravel
+from irl_gym.layouts import grid_shape
+from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Algorithm, Planner, ValueIteration
+from irl_gym.tabulate import make
+
+PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
+FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
+LearnerName = Literal["finite-lp", "feature-lp", "trajectory-lp"]
+MOST_FEATURES = 256
+"""Features that a default size makes at most."""
+MOST_CENTRES = 15
+"""Centres along a coordinate, or cosines, that a default size makes at most: those of Ng & Russell's experiment 3."""
+
+
+def environment_of(env_id: str | None, env_kwargs: Mapping[str, Any], dataset: str | None, dataset_root: str | None) -> gym.Env:
+    """The environment of an id, or the one that a dataset was recorded in.
+
+    Raises:
+        UnknownEnvironment: no such id.
+        DatasetMissing: no such dataset.
+        DatasetMismatch: a dataset that does not say where it was recorded.
+    """
+    if env_id is not None:
+        return make(env_id, **env_kwargs)
+    found = load_minari(dataset or "", root=dataset_root)
+    if found.env_spec is None:
+        raise DatasetMismatch(f"dataset {dataset!r} does not say where it was recorded: expected an environment. Name its id.")
+    return found.recover_environment()
+
+
+def steps_only(env: gym.Env) -> bool:
+    """Does an environment show coordinates, so that it has no table of its own?"""
+    return not isinstance(env.observation_space, spaces.Discrete)
+
+
+def planner_named(
+    name: PlannerName | None, total_timesteps: int | None, *, advantages: bool = False, control: bool = False
+) -> Planner | None:
+    """The planner of a name; None for None.
+
+    Args:
+        name: what was asked for.
+        total_timesteps: environment steps of SB3; None for its default.
+        advantages: is the reward an advantage between -1 and 0, on a table?
+        control: is the environment stepped itself, and shows coordinates?
+    """
+    if name is None or name == "value-iteration":
+        return None if name is None else ValueIteration()
+    algorithm: Algorithm = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}[name]  # type: ignore[assignment]
+    ppo = algorithm == "PPO"
+    settings = FOR_CONTROL.hyperparameters if control and ppo else FOR_ADVANTAGES if advantages and ppo else {}
+    default = FOR_CONTROL.total_timesteps if control else SB3().total_timesteps
+    return SB3(algorithm, total_timesteps or default, settings)
+
+
+def features_named(
+    name: FeatureName, env: gym.Env, *, size: int | None = None, coordinates: Sequence[int] | None = None
+) -> FeatureMap:
+    """The features of a name, for the observations of an environment.
+
+    Args:
+        name: "auto" is one-hot for Discrete observations, radial for others.
+        env: its observation space, or what is known of its state, gives the bounds.
+        size: centres along each coordinate, Fourier order or degree; None for as many as give 256 features at most, and 15 a
+            coordinate.
+        coordinates: values of each coordinate that a Discrete observation is made of, such as 5 5 5 4 for Taxi; None for rows
+            and columns of a grid environment.
+
+    Raises:
+        InvalidFeatures: observations that such features cannot be of.
+    """
+    space = env.observation_space
+    if name == "auto":
+        name = "one-hot" if isinstance(space, spaces.Discrete) and coordinates is None else "radial"
+    if name == "one-hot":
+        if not isinstance(space, spaces.Discrete) or space.start != 0:
+            raise InvalidFeatures(f"one-hot features are of integers from 0, but observations are of {space}: choose radial.")
+        return OneHot(int(space.n))
+    low, high, unravel = _bounds(env, coordinates)
+    d = len(low)
+    each = size or min(MOST_CENTRES, max(2, int(MOST_FEATURES ** (1 / d) + 1e-9)))
+    if name == "radial":
+        return RadialBasis.grid(low, high, each, coordinates=unravel)
+    if name == "fourier":
+        return Fourier(low, high, size or each - 1, unravel)
+    return Polynomial(low, high, size or 2, unravel)
+
+
+def _bounds(env: gym.Env, coordinates: Sequence[int] | None) -> tuple[list[float], list[float], Unravel | None]:
+    """Low and high of the coordinates, and what makes them of an observation."""
+    space: Any = env.observation_space
+    if isinstance(space, spaces.Discrete):
+        shape = coordinates or grid_shape(env)
+        if shape is None or int(np.prod(shape)) != space.n:
+            raise InvalidFeatures(
+                f"coordinates are {None if shape is None else list(shape)}, but observations are of {space}: expected numbers "
+                "whose product is theirs, such as 5 5 5 4 for Taxi. Name them, or choose one-hot."
+            )
+        return [0.0] * len(shape), [float(n - 1) for n in shape], Unravel(tuple(int(n) for n in shape))
+    if not isinstance(space, spaces.Box):
+        raise InvalidFeatures(
+            f"observations are of {space}: expected a Box or Discrete. Flatten them with Gymnasium's wrapper."
+        )
+    low, high = space.low.ravel().astype(float), space.high.ravel().astype(float)
+    if not (np.abs([low, high]) < 1e30).all():  # CartPole's velocities are unbounded, or bounded by float32's largest
+        low, high = _known_bounds(env, low, high)
+    return low.tolist(), high.tolist(), None
+
+
+def _known_bounds(env: gym.Env, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        known = coordinates_of(env.unwrapped)
+    except NotSettable as error:
+        raise InvalidFeatures(f"observations are unbounded: {low.tolist()} to {high.tolist()} ({error}).") from error
+    if len(known.low) != len(low) or not np.isfinite([known.low, known.high]).all():
+        raise InvalidFeatures(
+            f"observations range from {low.tolist()} to {high.tolist()}: expected finite bounds, to put features "
+            "between. Rescale them with Gymnasium's RescaleObservation, or give features in Python."
+        )
+    return known.low, known.high

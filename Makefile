@@ -4,10 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint types unit wheel bars clean
+.PHONY: demo paper test lint types unit wheel bars clean
 
 demo: $(READY)  ## recover a reward on FrozenLake 8x8, retrain PPO on it, print the report
 	$(BIN)/python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --out runs/demo
+
+paper: $(READY)  ## reproduce the experiments of Ng & Russell (2000): numbers, verdicts, figures (about 6 minutes)
+	$(BIN)/python scripts/reproduce_ng_russell.py
 
 test: lint types unit wheel  ## everything CI checks
 
@@ -27,10 +30,11 @@ wheel: $(READY)
 	$(BIN)/python -m build --wheel --outdir dist . > /dev/null
 	$(BIN)/check-wheel-contents dist
 
-bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment (about 8 minutes)
+bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment, the paper (about 20 minutes)
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
+	$(BIN)/python scripts/reproduce_ng_russell.py
 
 # torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.
 $(READY): pyproject.toml constraints.txt

@@ -95,11 +95,11 @@ class Experiment1:
         paid_in_goal = endless.P @ table.mdp.terminal.astype(float)
         return {
             "ways to break the expert's ties": len(experts),
-            "of these, ways that give the printed panel": matches,
+            "of these, such that give the printed panel": matches,
             "least lambda_0 of all ways": min(lambdas),
             "largest lambda_0 of all ways": max(lambdas),
-            "lambda_0 where 30 % go in one of the three other directions": self._lambda_0(noisy.mdp, noisy.reward),
-            "lambda_0 where the goal is paid at every step": self._lambda_0(endless, paid_in_goal.reshape(25, 4)),
+            "lambda_0 if noise is never the chosen move": self._lambda_0(noisy.mdp, noisy.reward),
+            "lambda_0 if the goal is paid at every step": self._lambda_0(endless, paid_in_goal.reshape(25, 4)),
         }
 
     def _lambda_0(self, mdp: TabularMDP, R: Reward) -> float:
@@ -169,9 +169,9 @@ class Outcome1:
         gap = max(one.certificate.duality_gap for one in (self.free, self.penalised))
         violation = max(one.certificate.worst_violation for one in (self.free, self.penalised))
         return (
-            at_most("lambda = 0: largest difference from the printed panel", 0.0, np.abs(free - PRINTED).max(), RESOLUTION),
-            near("lambda = 0: objective (target: not printed)", PRINTED_OBJECTIVE, self.free.objective, 5e-5),
-            near("lambda_0, where R becomes 0 (printed: 1.05, just below it)", PRINTED_LAMBDA_0, self.lambda_0, 5e-6),
+            at_most("lambda = 0: farthest from the printed panel", 0.0, np.abs(free - PRINTED).max(), RESOLUTION),
+            near("lambda = 0: objective (target, not printed)", PRINTED_OBJECTIVE, self.free.objective, 5e-5),
+            near("lambda_0 (target; printed: 1.05, just below)", PRINTED_LAMBDA_0, self.lambda_0, 5e-6),
             near(f"lambda = {self.settings.l1}: reward of the goal", 1.0, penalised[self.true == 1][0], 1e-6),
             reported(f"lambda = {self.settings.l1}: largest |R| elsewhere", "near 0", np.abs(away).max()),
             at_most("both: largest violation of (4)", 0.0, violation, 1e-6),

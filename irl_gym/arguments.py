@@ -49,8 +49,8 @@ class Arguments:
     """Values of each coordinate that a discrete observation is made of, such as 5 5 5 4 for Taxi."""
     sample: int | None = None
     """feature-lp. States in S_0, drawn at random; the default is all."""
-    rounds: int = 30
-    """trajectory-lp. At most."""
+    rounds: int | None = None
+    """trajectory-lp. At most; the default is 30 on tables, 8 on environments that are stepped."""
     inner: PlannerName | None = None
     """trajectory-lp. Who solves for each reward tried."""
     shaping: bool = True
@@ -58,7 +58,7 @@ class Arguments:
     retrain: PlannerName = "ppo"
     """Who learns from the recovered reward."""
     total_timesteps: int | None = None
-    """Environment steps of each SB3 agent; the default is 400,000 on tables, 100,000 on environments that are stepped."""
+    """Environment steps of each SB3 agent; the default is 400,000 on tables, 60,000 on environments that are stepped."""
     seed: int = 0
     """Of everything that is drawn."""
     out: Path | None = None
@@ -79,7 +79,7 @@ class Arguments:
             if self.learner == "feature-lp":
                 learner = FeatureLP(phi, self.sample, margin_cap=cap, l1=l1, seed=self.seed)
             else:
-                learner = TrajectoryLP(phi, l1=l1, max_rounds=self.rounds, seed=self.seed)
+                learner = TrajectoryLP(phi, l1=l1, max_rounds=self.rounds or (8 if control else 30), seed=self.seed)
         steps, shaped = self.total_timesteps, self.shaping and not control
         bins = self.bins[0] if len(self.bins) == 1 else self.bins or None
         return Experiment(

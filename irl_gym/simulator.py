@@ -21,7 +21,7 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.planners import Planner, ValueIteration
 from irl_gym.policies import Policy
-from irl_gym.rewarded_vec_env import RewardedVecEnv
+from irl_gym.rewarded_vec_env import rewarded
 from irl_gym.rollouts import moments_of
 from irl_gym.sampling import Successors
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -88,7 +88,7 @@ class Simulator:
                 raise InvalidParameter(
                     f"{self.env} has no spec: expected an environment that gymnasium.make made. Register it."
                 )
-            world = RewardedVecEnv(make_vec_env(lambda: gym.make(spec), self.num_envs, seed=seed), reward)
+            world = rewarded(make_vec_env(lambda: gym.make(spec), self.num_envs, seed=seed), reward, self.gamma)
         return self.planner.plan(world, gamma=self.gamma, seed=seed)
 
     @property

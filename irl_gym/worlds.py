@@ -21,7 +21,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
-from irl_gym.rewarded_vec_env import RewardedVecEnv
+from irl_gym.rewarded_vec_env import rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import run_episodes
 from irl_gym.run_folder import RunFolder
@@ -159,7 +159,7 @@ class SteppedWorld:
         spec: Any = self.env.spec
         env: VecEnv = make_vec_env(lambda: gym.make(spec), self.num_envs, seed=self.seed)
         if reward is not None:
-            env = RewardedVecEnv(env, reward)
+            env = rewarded(env, reward, self.gamma)
         return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
 
     def keep(self, policy: Policy, folder: Path, name: str) -> None:

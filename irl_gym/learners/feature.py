@@ -82,9 +82,9 @@ class FeatureLP:
         checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
         if self.horizon is not None:
             checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
-        if self.S_0 is not None and np.ndim(self.S_0) == 0:
+        if isinstance(self.S_0, int | float | np.number):
             checked_number("S_0", self.S_0, "a number of at least 1, states, or None for all", least=1, whole=True)
-        elif self.S_0 is not None and not len(np.asarray(self.S_0)):
+        elif self.S_0 is not None and not float_array("S_0", self.S_0, "states, all of one length", InvalidParameter).size:
             raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")
         check_solving(self.solver, self.time_limit)
 
@@ -159,7 +159,12 @@ class FeatureLP:
         margin = np.full(len(S_0), np.nan)
         margin[found.states] = found.rows.least(weights.alpha)
         tolerance = 1e-9 * found.rows.scale + 2 * (error or 0.0)
-        judged = Judged(margin, np.zeros(len(S_0)), tolerance, bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING))
+        judged = Judged(
+            margin,
+            np.zeros(len(S_0)),
+            tolerance,
+            bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING * found.rows.scale),
+        )
         certificate = self._certificate(found, solved, judged, error)
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
         return IRLResult(
@@ -200,7 +205,7 @@ class FeatureLP:
         least = rows.least(weights.alpha)
         expressible = bool(least.min() >= -unit and least.max() > unit)
         if not expressible:
-            expressible = most_agreement(rows, **solving) > NOTHING
+            expressible = most_agreement(rows, weights.alpha, **solving) > NOTHING
         bound = rows.bound(weights.y, **program)
         if bound <= unit * rows.n_groups:
             weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case

@@ -193,11 +193,14 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solv
     return Weights(np.clip(_value(alpha), -1.0, 1.0), y, answer)
 
 
-def most_agreement(rows: Rows, *, solver: SolverName = "auto", time_limit: float | None = None) -> float:
+def most_agreement(
+    rows: Rows, near: np.ndarray | None = None, *, solver: SolverName = "auto", time_limit: float | None = None
+) -> float:
     """A bound above the mean of d . alpha, over scale, of all rewards that leave *no* row below 0.
 
     Where it is 0, to rounding, the features express no reward that makes the expert optimal, but those that leave it tied with
-    everything. The rows that bind are generated: each program is a relaxation, so its bound holds for the whole.
+    everything. The rows that bind are generated, first those worst under `near` (K,): each program is a relaxation, so its
+    bound holds for the whole.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
@@ -213,7 +216,7 @@ def most_agreement(rows: Rows, *, solver: SolverName = "auto", time_limit: float
         y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
         return float(np.abs(mean + y @ d[part]).sum()), 0.0, _value(alpha)
 
-    return _generate(d, solve_part)
+    return _generate(d, np.sign(mean) if near is None else near, solve_part)
 
 
 def uniform_margin(rows: Rows, *, solver: SolverName = "auto", time_limit: float | None = None) -> float:
@@ -233,7 +236,7 @@ def uniform_margin(rows: Rows, *, solver: SolverName = "auto", time_limit: float
         solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
         return float(np.asarray(margin.value)), float(np.asarray(margin.value)), _value(alpha)
 
-    found = _generate(d, solve_part)
+    found = _generate(d, np.sign(d.mean(axis=0)), solve_part)
     return found * rows.scale if found > UNIFORM else 0.0
 
 
@@ -241,15 +244,16 @@ UNIFORM = 1e-7
 """A uniform margin below this, over the size of the rows, is the solvers' rounding."""
 
 
-def _generate(d: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:
+def _generate(d: np.ndarray, alpha: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:
     """The value of the last of a series of relaxations, each with the rows put in that the answer before violates most.
 
     Args:
         d: (n, K).
+        alpha: (K,) before the first.
         solve_part: (n,) rows that are in, to the program's value, what every row has to reach, and alpha.
     """
     part = np.zeros(len(d), dtype=bool)
-    values, least, value = d @ np.sign(d.mean(axis=0)), np.inf, 0.0
+    values, least, value = d @ alpha, np.inf, 0.0
     while True:
         worst = np.argsort(np.where(part, np.inf, values), kind="stable")[:SAMPLE]
         worst = worst[(values[worst] < least - 1e-9) & ~part[worst]]

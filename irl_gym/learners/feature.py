@@ -82,7 +82,7 @@ class FeatureLP:
         checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
         if self.horizon is not None:
             checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
-        if isinstance(self.S_0, int | float | np.number):
+        if isinstance(self.S_0, int | float | str | np.number):
             checked_number("S_0", self.S_0, "a number of at least 1, states, or None for all", least=1, whole=True)
         elif self.S_0 is not None and not float_array("S_0", self.S_0, "states, all of one length", InvalidParameter).size:
             raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")

@@ -14,6 +14,7 @@ is above every objective, whatever the solver did. Axes: K features, n rows, G g
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import cvxpy as cp
@@ -121,31 +122,43 @@ def best_weights(
     """Solve the program.
 
     An optimum is a vertex, at which at most K of the G concave terms have a kink; all others are linear around it. So with many
-    groups a term is taken as the linear piece that is active near the optimum of a sample, and its rows are put in when the
-    answer shows that another piece is lower there. Every program solved is a relaxation, and the last one, in which no piece
-    is missing, has the optimum of the whole.
+    groups the terms far from a kink are taken as their linear piece, in a box around the best weights so far, at first those of
+    a sample. Each such program is a relaxation within its box; one in which no piece is missing and the box does not bind has
+    the optimum of the whole. The box grows after a program without a missing piece, and shrinks after one without a gain.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
     """
     solving = _Solving(slope, l1, cap, solver, time_limit)
+    K = rows.d.shape[1]
     if rows.n_groups <= SAMPLE:
-        return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(rows.d.shape[1]), solving)
+        return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(K), np.array([-np.ones(K), np.ones(K)]), solving)
     part = np.zeros(rows.n_groups, dtype=bool)
     part[np.linspace(0, rows.n_groups - 1, SAMPLE).astype(int)] = True
-    alpha = _solve_part(rows, part, np.zeros(rows.d.shape[1]), solving).alpha
-    part = _kinks(rows, alpha, cap)
-    active, weight = rows.active(alpha, slope, cap)
-    most = np.where(weight == 0, cap, 0.0) if np.isfinite(cap) else np.zeros(rows.n_groups)
+    best = _solve_part(rows, part, np.zeros(K), np.array([-np.ones(K), np.ones(K)]), solving).alpha
+    value, radius, extra = rows.objective(best, slope=slope, l1=l1, cap=cap), RADIUS, np.zeros_like(part)
     while True:
-        linear = (weight * ~part) @ rows.d[active]
-        found = _solve_part(rows, part, linear, solving)
-        model = most + weight * (rows.d[active] @ found.alpha)
+        part = _kinks(rows, best, cap) | extra
+        active, weight = rows.active(best, slope, cap)
+        box = np.clip([best - radius, best + radius], -1, 1)
+        found = _solve_part(rows, part, (weight * ~part) @ rows.d[active], box, solving)
+        model = np.where(weight == 0, cap if np.isfinite(cap) else 0.0, 0.0) + weight * (rows.d[active] @ found.alpha)
         missing = ~part & (model > rows.terms(found.alpha, slope, cap) + 1e-9 * rows.scale)
+        now = rows.objective(found.alpha, slope=slope, l1=l1, cap=cap)
         if not missing.any():
-            found.y[active[~part]] = weight[~part]
-            return found
-        part |= missing
+            inside = (np.abs(found.alpha - best) < 0.999 * radius) | (np.abs(found.alpha) > 1 - 1e-9)
+            if inside.all():
+                found.y[active[~part]] = weight[~part]
+                return found
+            radius *= 4
+        elif now <= value:
+            radius, extra = radius / 4, extra | (missing if radius < LEAST_RADIUS else False)
+        if now > value:
+            best, value = found.alpha, now
+
+
+RADIUS, LEAST_RADIUS = 0.25, 1e-4
+"""Half the width of the first box; when it is below the second, missing pieces are put in for good."""
 
 
 @dataclass(frozen=True)
@@ -169,8 +182,11 @@ def _kinks(rows: Rows, alpha: np.ndarray, cap: float) -> np.ndarray:
     return mask
 
 
-def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solving) -> Weights:
-    """The program with the rows of some groups only; the others are in `linear` (K,), the gradient of their sum."""
+def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, box: np.ndarray, solving: _Solving) -> Weights:
+    """The program with the rows of some groups only; the others are in `linear` (K,), the gradient of their sum.
+
+    `box` (2, K) is what alpha lies between.
+    """
     kept = part[rows.groups]
     d = rows.d[kept] / rows.scale
     groups = (np.cumsum(part) - 1)[rows.groups[kept]]
@@ -179,7 +195,7 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solv
     picks = sp.csr_array((np.ones(n), (np.arange(n), groups)), shape=(n, G))
     above: Any = picks @ (u - v) <= d @ alpha
     objective = cp.sum(u) - solving.slope * cp.sum(v) + (linear / rows.scale) @ alpha
-    constraints: list[Any] = [above, alpha <= 1, alpha >= -1]
+    constraints: list[Any] = [above, alpha >= box[0], alpha <= box[1]]
     if np.isfinite(solving.cap):
         constraints.append(u <= solving.cap / rows.scale)
     if solving.l1:
@@ -190,7 +206,7 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, solving: _Solv
     answer = solve(problem, rows=n, solver=solving.solver, time_limit=solving.time_limit)
     y = np.zeros(len(rows.groups))
     y[kept] = above.dual_value
-    return Weights(np.clip(_value(alpha), -1.0, 1.0), y, answer)
+    return Weights(np.clip(_value(alpha), *box), y, answer)
 
 
 def most_agreement(
@@ -247,6 +263,8 @@ UNIFORM = 1e-7
 def _generate(d: np.ndarray, alpha: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:
     """The value of the last of a series of relaxations, each with the rows put in that the answer before violates most.
 
+    Rows that are far from binding leave again, but for the last of many rounds, so that the programs stay small.
+
     Args:
         d: (n, K).
         alpha: (K,) before the first.
@@ -254,16 +272,24 @@ def _generate(d: np.ndarray, alpha: np.ndarray, solve_part: Callable[[np.ndarray
     """
     part = np.zeros(len(d), dtype=bool)
     values, least, value = d @ alpha, np.inf, 0.0
-    while True:
-        worst = np.argsort(np.where(part, np.inf, values), kind="stable")[:SAMPLE]
+    for number in count():
+        worst = np.argsort(np.where(part, np.inf, values), kind="stable")[: max(1, SAMPLE // 2)]
         worst = worst[(values[worst] < least - 1e-9) & ~part[worst]]
         if not worst.size:
             return value
+        if number < MOST_PURGES:
+            kept = np.argsort(np.where(part, values, np.inf), kind="stable")[:SAMPLE]
+            part &= np.isin(np.arange(len(d)), kept)
         part[worst] = True
         value, least, alpha = solve_part(part)
         if value <= 1e-9:
             return value
         values = d @ alpha
+    return value
+
+
+MOST_PURGES = 50
+"""Rounds after which rows that are in stay in, so that the series ends."""
 
 
 def _value(variable: cp.Variable) -> np.ndarray:

@@ -5,7 +5,7 @@ step one after the other, and only the policy gains. Episode i is reset with the
 """
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,7 +51,7 @@ def moments_of(
     """Run a policy for n episodes, many at once, and yield what they see, time by time, batch by batch.
 
     Args:
-        env: made anew from its spec, or copied where it has none; itself neither stepped nor reset.
+        env: made anew from its spec, or copied where that cannot be done; itself neither stepped nor reset.
         policy: with SB3's `predict`, of batches; actions count from 0.
         n: N, at least 1.
         seed: of the first batch; each batch has its own.
@@ -59,14 +59,16 @@ def moments_of(
         deterministic: passed to `predict`.
 
     Raises:
-        InvalidParameter: fewer than 1 episodes or steps; or no cut where the environment has no time limit either.
+        InvalidParameter: fewer than 1 episodes or steps, a negative seed, or no cut where the environment has no time limit
+            either.
     """
     checked_number("n", n, "a number of episodes of at least 1", least=1, whole=True)
+    checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True)
     if most is not None:
         checked_number("most", most, "a number of steps of at least 1", least=1, whole=True)
     elif env.spec is None or env.spec.max_episode_steps is None:
         raise InvalidParameter(f"most is None, and {env} has no time limit: expected a number of steps. Give `most`.")
-    return _batches(env, policy, n, seed, most, deterministic)
+    return _batches(env, policy, int(n), int(seed), most, deterministic)  # NumPy's integers do not seed Gymnasium
 
 
 def _batches(env: gym.Env, policy: Policy, n: int, seed: int, most: int | None, deterministic: bool) -> Iterator[Moment]:
@@ -113,9 +115,15 @@ def _vector(env: gym.Env, copies: int) -> VectorEnv:
         if made.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) == AutoresetMode.NEXT_STEP:
             return made
         made.close()
-    spec = env.spec
-    make = (lambda: copy.deepcopy(env)) if spec is None else (lambda: gym.make(spec, **_quiet(env)))
-    return SyncVectorEnv([make] * copies)
+    return SyncVectorEnv([maker_of(env)] * copies)
+
+
+def maker_of(env: gym.Env) -> Callable[[], gym.Env]:
+    """Makes environments like this one: from its spec, or copies where it has none, or wrappers that a spec cannot hold."""
+    spec: Any = env.spec
+    if spec is None or any(wrapper.kwargs is None for wrapper in spec.additional_wrappers):
+        return lambda: copy.deepcopy(env)
+    return lambda: gym.make(spec, **_quiet(env))
 
 
 def _quiet(env: gym.Env) -> dict[str, Any]:
@@ -130,9 +138,10 @@ def run_episodes(
 
     Their `seed` is None: episodes of one batch share its generator.
     """
+    moments = moments_of(env, policy, n, seed=seed, most=most, deterministic=deterministic)
     found: list[list[Moment]] = [[] for _ in range(n)]
     places: list[list[int]] = [[] for _ in range(n)]
-    for moment in moments_of(env, policy, n, seed=seed, most=most, deterministic=deterministic):
+    for moment in moments:
         for place, number in enumerate(moment.who.tolist()):
             found[number].append(moment)
             places[number].append(place)

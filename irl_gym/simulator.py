@@ -15,14 +15,14 @@ from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.features import FeatureMap, batch_size, checked_features, over_rows
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.planners import Planner, ValueIteration
 from irl_gym.policies import Policy
 from irl_gym.rewarded_vec_env import rewarded
-from irl_gym.rollouts import moments_of
+from irl_gym.rollouts import maker_of, moments_of
 from irl_gym.sampling import Successors
 from irl_gym.tabular_vec_env import TabularVecEnv
 from irl_gym.tabulate import tabulate
@@ -63,10 +63,17 @@ class Simulator:
 
     @cached_property
     def known(self) -> Tabulation | None:
-        """The table, if there is one."""
-        if self.table is None and isinstance(self.planner, ValueIteration):
+        """The table, if there is one.
+
+        Raises:
+            NotTabular, NotDiscrete: ValueIteration needs one, and none can be made.
+        """
+        if self.table is not None or not isinstance(self.planner, ValueIteration):
+            return self.table
+        try:
             return tabulate(self.env, gamma=self.gamma, check_steps=0)
-        return self.table
+        except (NotTabular, NotDiscrete) as error:
+            raise type(error)(f"{error} Or plan with SB3, which needs none.") from error
 
     @property
     def n_actions(self) -> int:
@@ -83,12 +90,7 @@ class Simulator:
                 states=table.states, seed=seed,
             )  # fmt: skip
         else:
-            spec: Any = self.env.spec
-            if spec is None:
-                raise InvalidParameter(
-                    f"{self.env} has no spec: expected an environment that gymnasium.make made. Register it."
-                )
-            world = rewarded(make_vec_env(lambda: gym.make(spec), self.num_envs, seed=seed), reward, self.gamma)
+            world = rewarded(make_vec_env(maker_of(self.env), self.num_envs, seed=seed), reward, self.gamma)
         return self.planner.plan(world, gamma=self.gamma, seed=seed)
 
     @property

@@ -176,7 +176,7 @@ def action_counts(axis: Axes, parts: Mapping[str, np.ndarray]) -> None:
     axis.margins(x=0.12)
     axis.set_xlabel("states in which the action is taken")
     if len(parts) > 1:
-        axis.legend(frameon=False, loc="lower right")
+        axis.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=len(parts))
     plain(axis)
 
 

@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from irl_gym import plotting
+from irl_gym.cell_maps import draw_actions, draw_planes
+from irl_gym.cells import Cells
 from irl_gym.dynamic_programming import evaluate_policy
 from irl_gym.evaluation import from_data, learning_curve, optimal_set
 from irl_gym.layouts import grid_layout
 from irl_gym.linear_reward import LinearReward
+from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import optimal_actions
 from irl_gym.policies import as_distribution
+from irl_gym.rewards import TabularReward
 from irl_gym.worlds import SteppedWorld, TableWorld
 
 if TYPE_CHECKING:
@@ -45,12 +49,36 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
     else:
         taken = as_distribution(expert, mdp.n_states, mdp.n_actions) > 0
     values = [evaluate_policy(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
+    if isinstance(table.states, Cells) and len(table.states.shape) == 2:
+        told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)
+        return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})
     agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
     optimal = optimal_actions(mdp, true) if not from_data(loop) else optimal_set(loop)
     return {
         "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp),
         "values.png": plotting.draw_values(layout, values[0], values[1], mdp),
         "policies.png": plotting.draw_policies(layout, taken, agent, optimal, mdp),
+    }
+
+
+def _of_plane(
+    cells: Cells,
+    mdp: TabularMDP,
+    rewards: tuple[TabularReward, TabularReward],
+    values: list[np.ndarray],
+    policies: dict[str, np.ndarray],
+) -> dict[str, plotting.Figure]:
+    """The same over the two coordinates of a grid of cells."""
+    paid = [reward.values if reward.on_states else reward.values.max(axis=1) for reward in rewards]
+    names = [
+        f"{name} reward, {'on arrival' if reward.on_states else 'of a step, largest over actions'}"
+        for name, reward in zip(("True", "Learned"), rewards, strict=True)
+    ]
+    valued = ("Expert's value, true reward", "Expert's value, learned reward")
+    return {
+        "rewards.png": draw_planes(cells, mdp, dict(zip(names, paid, strict=True)), label="reward", centred=True),
+        "values.png": draw_planes(cells, mdp, dict(zip(valued, values, strict=True)), label="discounted value", centred=False),
+        "policies.png": draw_actions(cells, mdp, policies, mdp.n_actions),
     }
 
 

@@ -43,7 +43,7 @@ class GenerativeModel:
         return physics_of(self.env, bounds=self.bounds)
 
     def states(self, n: int, rng: np.random.Generator) -> np.ndarray:
-        """(n, d) states drawn uniformly within the bounds."""
+        """(n, d) states drawn uniformly within the bounds, which should hold no terminal ones: a world does not name these."""
         where = self.physics.coordinates
         return rng.uniform(where.low, where.high, size=(n, len(where.low)))
 

@@ -109,8 +109,9 @@ class Agent:
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
-        """SB3's `predict`."""
-        return self.model.predict(observation, state, episode_start, deterministic)
+        """SB3's `predict`, on one thread: networks this small are slower on more."""
+        with _torch_threads(1):
+            return self.model.predict(observation, state, episode_start, deterministic)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write SB3's zip. Beside first, then renamed."""

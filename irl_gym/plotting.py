@@ -189,8 +189,9 @@ def draw_returns(points: Mapping[str, np.ndarray]) -> Figure:
     """
     figure = drawing.blank(6.4, 4.6)
     axis = figure.add_subplot()
-    for (name, pairs), colour in zip(points.items(), cycle(drawing.SERIES), strict=False):
-        axis.scatter(pairs[:, 0], pairs[:, 1], s=18, color=colour, alpha=0.5, linewidths=0, label=name)
+    for (name, pairs), colour, marker in zip(points.items(), cycle(drawing.SERIES), cycle("osx"), strict=False):
+        style: dict[str, Any] = {"color": colour} if marker == "x" else {"facecolors": "none", "edgecolors": colour}
+        axis.scatter(pairs[:, 0], pairs[:, 1], s=36, marker=marker, linewidths=1.1, label=name, **style)
     axis.legend(frameon=False)
     axis.set(xlabel="true return", ylabel="return under the recovered reward", title="Episodes under both rewards")
     drawing.plain(axis)

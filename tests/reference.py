@@ -84,13 +84,13 @@ def margins(P: np.ndarray, gamma: float, expert: np.ndarray, R: np.ndarray, *, s
     return differences.min(axis=1)
 
 
-def section_4_lp(P, gamma, expert, Phi, S_0, *, penalty: float = 2.0, l1: float = 0.0):
+def section_4_lp(P, gamma, expert, Phi, S_0, *, penalty: float = 2.0, l1: float = 0.0, cap: float | None = None):
     """Section 4, with the explicit inverse. Unknowns: alpha+ (K), alpha- (K), z (one a state). Returns objective and alpha.
 
     maximise    sum_{s in S_0} z_s - l1 sum(alpha+ + alpha-)
     subject to  z_s <= x and z_s <= penalty x,    x = (P_pi(s) - P_a(s)) sum_i alpha_i V_i, for each a != pi(s)
                 V_i = (I - gamma P_pi)^-1 phi_i,    alpha = alpha+ - alpha-,    0 <= alpha+, alpha- <= 1
-    Rows without a difference in successors are not counted. `Phi` is (S, K).
+    Rows without a difference in successors are not counted. `Phi` is (S, K). With a cap z_s <= cap too, which is ours.
     """
     S, A, _ = P.shape
     K = Phi.shape[1]
@@ -105,7 +105,20 @@ def section_4_lp(P, gamma, expert, Phi, S_0, *, penalty: float = 2.0, l1: float 
         upper.append(np.concatenate([-x, x, picks_z]))
         upper.append(np.concatenate([-penalty * x, penalty * x, picks_z]))
     cost = np.concatenate([np.full(2 * K, l1), -np.ones(len(counted))])
-    bounds = [(0, 1)] * (2 * K) + [(None, None)] * len(counted)
+    bounds = [(0, 1)] * (2 * K) + [(None, cap)] * len(counted)
     found = linprog(cost, A_ub=np.array(upper), b_ub=np.zeros(len(upper)), bounds=bounds, method="highs")
     assert found.success, found.message
     return -found.fun, found.x[:K] - found.x[K : 2 * K]
+
+
+def uniform_margin(P, gamma, expert, Phi, S_0):
+    """The largest margin that all rows of section 4 can have at once: max eps, d_r . alpha >= eps, |alpha_i| <= 1."""
+    S, A, _ = P.shape
+    P_pi = P[np.arange(S), expert]
+    V = np.linalg.inv(np.eye(S) - gamma * P_pi) @ Phi
+    d = [(P_pi[s] - P[s, a]) @ V for s in S_0 for a in range(A) if np.abs(P_pi[s] - P[s, a]).max() > 1e-12]
+    K = Phi.shape[1]
+    upper = np.hstack([-np.array(d), np.ones((len(d), 1))])
+    found = linprog([0.0] * K + [-1.0], A_ub=upper, b_ub=np.zeros(len(d)), bounds=[(-1, 1)] * K + [(None, None)])
+    assert found.success, found.message
+    return -found.fun

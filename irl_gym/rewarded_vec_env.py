@@ -2,21 +2,44 @@
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
+from irl_gym.errors import InvalidParameter
 from irl_gym.features import batch_of_one, take
 from irl_gym.linear_reward import LinearReward
 
 
 def rewarded(venv: VecEnv, reward: LinearReward, gamma: float) -> VecEnv:
-    """A vector environment that pays a reward, divided by the running deviation of its return: SB3's VecNormalize.
+    """A vector environment that pays a reward, on a scale that agents learn from."""
+    return normalised(RewardedVecEnv(venv, reward), gamma)
+
+
+def normalised(venv: VecEnv, gamma: float) -> VecEnv:
+    """Rewards divided by the running deviation of their return: SB3's VecNormalize.
 
     A sum of K features may pay tens a step, which the losses of policy gradients do not take well: without the division PPO
     kept CartPole up for 128 steps on a reward on which it now does for 500. A positive number changes no comparison between
     policies. Observations stay as they are, and nothing is clipped.
     """
-    return VecNormalize(RewardedVecEnv(venv, reward), norm_obs=False, clip_reward=np.inf, gamma=gamma)
+    return VecNormalize(venv, norm_obs=False, clip_reward=np.inf, gamma=gamma)
+
+
+def check_steppable(env: gym.Env) -> None:
+    """Check that SB3 can train on copies of an environment.
+
+    Raises:
+        InvalidParameter: actions that do not count from 0, or Tuple observations.
+    """
+    actions = env.action_space
+    if isinstance(actions, spaces.Discrete) and actions.start != 0:
+        raise InvalidParameter(f"the actions are {actions}: expected numbers from 0, as Stable-Baselines3 gives. Shift them.")
+    if isinstance(env.observation_space, spaces.Tuple):
+        raise InvalidParameter(
+            f"the observations are {env.observation_space}: Stable-Baselines3 takes no Tuple. Flatten them with a wrapper."
+        )
 
 
 class RewardedVecEnv(VecEnvWrapper):

@@ -21,7 +21,7 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.planners import Planner, ValueIteration
 from irl_gym.policies import Policy
-from irl_gym.rewarded_vec_env import rewarded
+from irl_gym.rewarded_vec_env import check_steppable, normalised, rewarded
 from irl_gym.rollouts import maker_of, moments_of
 from irl_gym.sampling import Successors
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -55,10 +55,23 @@ class Simulator:
     def __post_init__(self) -> None:
         check_discount(self.gamma)
         checked_number("num_envs", self.num_envs, "a whole number of at least 1", least=1, whole=True)
+        if not isinstance(self.env, gym.Env):
+            raise InvalidParameter(
+                f"env is a {type(self.env).__name__}: expected an environment, such as gymnasium.make gives."
+            )
+        if not isinstance(self.planner, Planner):
+            raise InvalidParameter(f"planner is {self.planner!r}: expected one with `plan`, such as ValueIteration() or SB3().")
         if not isinstance(self.env.action_space, spaces.Discrete):
             raise InvalidParameter(
                 f"the action space is {self.env.action_space}: expected Discrete. Wrap the environment in Gymnasium's "
                 "DiscretizeAction."
+            )
+        if self.table is not None and (
+            self.table.states.space != self.env.observation_space or self.table.mdp.n_actions != self.n_actions
+        ):
+            raise InvalidParameter(
+                f"the table is of observations {self.table.states.space} and {self.table.mdp.n_actions} actions: expected "
+                f"{self.env.observation_space} and {self.n_actions}, the environment's. Is it another one's?"
             )
 
     @cached_property
@@ -83,15 +96,28 @@ class Simulator:
 
     def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
         """A policy for a reward of observations."""
-        if self.known is not None:
-            table = self.known
+        table = self.known
+        if table is None:
+            check_steppable(self.env)
+            world = rewarded(make_vec_env(maker_of(self.env), self.num_envs, seed=seed), reward, self.gamma)
+        else:
             world = TabularVecEnv(
                 table.mdp, reward.tabular(table.states), num_envs=self.num_envs, max_episode_steps=self._limit,
                 states=table.states, seed=seed,
             )  # fmt: skip
-        else:
-            world = rewarded(make_vec_env(maker_of(self.env), self.num_envs, seed=seed), reward, self.gamma)
-        return self.planner.plan(world, gamma=self.gamma, seed=seed)
+            if not isinstance(self.planner, ValueIteration):
+                world = normalised(world, self.gamma)
+        try:
+            return self.planner.plan(world, gamma=self.gamma, seed=seed)
+        finally:
+            world.close()
+
+    @property
+    def limit(self) -> int | None:
+        """Steps after which episodes are cut: the environment's time limit where it is run, none where its table is drawn."""
+        if self.known is not None and self.known.evidence.exact:
+            return None  # a time limit is no part of an MDP
+        return self._limit
 
     @property
     def _limit(self) -> int | None:
@@ -120,7 +146,7 @@ class Simulator:
         """Time, episodes that go on, and their features (m, K)."""
         table = self.known
         if table is not None and table.evidence.exact:
-            yield from _drawn(table, policy, features, n, min(horizon, self._limit or horizon), seed)
+            yield from _drawn(table, policy, features, n, horizon, seed)
             return
         for moment in moments_of(self.env, policy, n, seed=seed, most=horizon):
             yield moment.time, moment.who, checked_features(features, moment.observations)

@@ -9,8 +9,9 @@ from a random first policy. Trajectories are cut after H steps, which costs a va
 (footnote 2).
 
 Which round is best? The paper looks at the policies. Here: the round whose policy has V^ nearest to the expert's in the sum of
-absolute differences. For *every* reward alpha . phi with |alpha_i| <= 1, the expert's own too if it is one of them, the values
-of policy and expert differ by that distance at most, and by the noise of the estimates. It takes no true reward to know it.
+absolute differences. For *every* reward alpha . phi with |alpha_i| <= 1, the expert's own too if it is one of them, the sampled
+values of policy and expert differ by that distance at most; their true values by it, the noise of the samples and what cutting
+costs. It takes no true reward to know it.
 Axes: N episodes, K features.
 """
 
@@ -22,11 +23,12 @@ import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import InvalidDemonstrations
+from irl_gym.errors import InvalidParameter
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import FeatureMap, as_features, checked_features
 from irl_gym.generative import least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult
+from irl_gym.learners.estimates import Estimate, nearest, usable
 from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
 from irl_gym.learners.weights import Rows, Weights, best_weights
 from irl_gym.linear_reward import LinearReward
@@ -43,6 +45,11 @@ class World(Protocol):
         """Discount."""
         ...
 
+    @property
+    def limit(self) -> int | None:
+        """Steps after which episodes are cut; None if they are not."""
+        ...
+
     def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
         """A policy for a reward of observations."""
         ...
@@ -50,23 +57,6 @@ class World(Protocol):
     def sums(self, policy: Policy | None, features: FeatureMap, n: int, *, horizon: int, seed: int) -> np.ndarray:
         """(N, K) sum_t gamma^t phi(s_t) of n episodes of a policy, random if None, cut after `horizon` steps."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """V^ of a policy and the covariance of its error."""
-
-    mean: np.ndarray
-    """(K,)."""
-    covariance: np.ndarray
-    """(K, K) of the mean."""
-
-    @classmethod
-    def of(cls, sums: np.ndarray) -> "Estimate":
-        """From (N, K) sums of episodes; one episode alone tells nothing of its error, which is then taken to be 0."""
-        n = len(sums)
-        spread = np.cov(sums, rowvar=False).reshape(sums.shape[1], -1) / n if n > 1 else np.zeros((sums.shape[1],) * 2)
-        return cls(sums.mean(axis=0), spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +73,8 @@ class TrajectoryLP:
     trajectories: int = 1_000
     """m, run for each policy."""
     horizon: int | None = None
-    """H, steps after which trajectories are cut, the expert's too; None for the least H with gamma^H <= 0.01. The shortest of
-    the expert's episodes that a time limit cut makes it shorter."""
+    """H, steps after which trajectories are cut, the expert's too; None for the least H with gamma^H <= 0.01. A time limit
+    makes it shorter; see `estimates.usable`."""
     max_rounds: int = 30
     """Rounds at most."""
     patience: int = 10
@@ -120,25 +110,25 @@ class TrajectoryLP:
         """The best round: the one whose policy is nearest to the expert in the features.
 
         Stops after `max_rounds`, when `patience` rounds have not come nearer, or when a policy cannot be told from the expert:
-        its distance is no more than the standard errors of its terms.
+        its distance is no more than the standard errors of its terms; or when alpha = 0 is best, after which nothing changes.
 
         Args:
             world: such as Simulator(env, planner, gamma).
             episodes: the expert's, at least one; `read_minari` gives them.
 
         Raises:
-            InvalidDemonstrations: no episode.
+            InvalidParameter: a world that cannot be run and solved.
+            InvalidDemonstrations: no episode, or none that ends or goes on to the horizon.
             InvalidFeatures: what the features give is not (N, K) finite numbers.
             SolverTimeout, SolverFailed: no answer.
         """
         results: list[IRLResult[LinearReward, TrajectoryCertificate]] = []
         best = 0
-        for number, result in enumerate(self.iterate(world, episodes)):
+        for result in self.iterate(world, episodes):
             results.append(result)
-            if result.certificate.distance < results[best].certificate.distance:
-                best = number
-            near = result.certificate.distance <= result.certificate.distance_error
-            if near or number - best >= self.patience:
+            proofs = [one.certificate for one in results]
+            best, enough = nearest([p.distance for p in proofs], [p.distance_error for p in proofs], self.patience)
+            if enough or result.certificate.zero:
                 break
         history = [{key: one.stats[key] for key in ROUND} | {"distance": one.certificate.distance} for one in results]
         stats = {**results[best].stats, "best_round": best + 1, "best_by": "distance", "rounds": history}
@@ -146,9 +136,15 @@ class TrajectoryLP:
 
     def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult[LinearReward, TrajectoryCertificate]]:
         """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
-        expert = list(episodes)
-        horizon, r_unit = self._horizon(world.gamma, expert), self._largest(expert)
-        theirs = Estimate.of(discounted_sums(expert, self.phi, world.gamma, horizon=horizon))
+        if not isinstance(world, World):
+            raise InvalidParameter(
+                f"the world is a {type(world).__name__}: expected one that can be run and solved, such as "
+                "Simulator(env, ValueIteration(), gamma)."
+            )
+        asked = least_horizon(world.gamma) if self.horizon is None else int(self.horizon)
+        expert = usable(episodes, asked, world.limit)
+        horizon, r_unit = expert.horizon, self._largest(expert.episodes)
+        theirs = Estimate.of(discounted_sums(expert.episodes, self.phi, world.gamma, horizon=horizon))
         found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
         for number in range(1, self.max_rounds + 1):
             rows = Rows(theirs.mean - np.array([one.mean for one in found]), np.arange(len(found)))
@@ -163,17 +159,16 @@ class TrajectoryLP:
             certificate = self._certificate(rows, weights, theirs, found, newest, horizon, cut)
             status = weights.answer.status if weights.alpha.any() else Status.ZERO_WEIGHTS
             stats = {
-                "round": number, "regret": certificate.regret, "regret_error": certificate.regret_error,
-                "objective": certificate.objective, "seconds_solving": weights.answer.seconds, "expert_episodes": len(expert),
-            }  # fmt: skip
+                "round": number,
+                "regret": certificate.regret,
+                "regret_error": certificate.regret_error,
+                "objective": certificate.objective,
+                "seconds_solving": weights.answer.seconds,
+                "expert_episodes": len(expert.episodes),
+                "episodes_dropped": expert.dropped,
+            }
             yield IRLResult(reward, status, certificate.objective, certificate, stats, policy)
             found.append(newest)
-
-    def _horizon(self, gamma: float, expert: list[Episode]) -> int:
-        if not expert:
-            raise InvalidDemonstrations("there are no episodes: expected at least one of the expert's.")
-        asked = least_horizon(gamma) if self.horizon is None else int(self.horizon)
-        return min([asked, *(len(one) for one in expert if not one.terminated)])
 
     def _largest(self, expert: list[Episode]) -> float:
         """The largest ||phi||_1 that the expert met: no reward with |alpha_i| <= 1 pays it more."""
@@ -185,10 +180,10 @@ class TrajectoryLP:
         alpha, slope, l1 = weights.alpha, float(self.penalty), float(self.l1)
 
         def error(other: Estimate) -> float:
-            return float(np.sqrt(max(alpha @ (theirs.covariance + other.covariance) @ alpha, 0.0)))
+            return float(np.sqrt(theirs.variance(alpha) + other.variance(alpha)))
 
         difference = theirs.mean - newest.mean
-        noise = np.sqrt(np.maximum(np.diag(theirs.covariance) + np.diag(newest.covariance), 0.0))
+        noise = np.sqrt(theirs.variances + newest.variances)
         return TrajectoryCertificate(
             gaps=rows.d @ alpha,
             gap_errors=np.array([error(one) for one in found]),

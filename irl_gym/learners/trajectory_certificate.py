@@ -22,7 +22,7 @@ class TrajectoryCertificate:
     regret_error: float
     """Its standard error."""
     distance: float
-    """||V^expert - V^new||_1: no reward with |alpha_i| <= 1 tells the new policy's value from the expert's by more."""
+    """||V^expert - V^new||_1: no reward with |alpha_i| <= 1 tells the two apart by more on these trajectories."""
     distance_error: float
     """Sum of the standard errors of its K terms: what is left of it when the two policies are the same."""
     objective: float
@@ -42,7 +42,8 @@ class TrajectoryCertificate:
     horizon: int
     """H, steps after which trajectories were cut."""
     truncation: float
-    """What cutting changes a value by at most, gamma^(H+1) R_max / (1 - gamma); R_max: the largest ||phi||_1 the expert met."""
+    """What cutting changes a value by at most while no reward is larger than R_max: gamma^(H+1) R_max / (1 - gamma), R_max the
+    largest ||phi||_1 that the expert met."""
     zero: bool
     """Is alpha zero?"""
 

@@ -124,7 +124,8 @@ def best_weights(
     An optimum is a vertex, at which at most K of the G concave terms have a kink; all others are linear around it. So with many
     groups the terms far from a kink are taken as their linear piece, in a box around the best weights so far, at first those of
     a sample. Each such program is a relaxation within its box; one in which no piece is missing and the box does not bind has
-    the optimum of the whole. The box grows after a program without a missing piece, and shrinks after one without a gain.
+    the optimum of the whole. The box grows after a program without a missing piece; after one without a
+    gain it shrinks, and the pieces that were missing stay, so the series ends.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
@@ -147,18 +148,18 @@ def best_weights(
         now = rows.objective(found.alpha, slope=slope, l1=l1, cap=cap)
         if not missing.any():
             inside = (np.abs(found.alpha - best) < 0.999 * radius) | (np.abs(found.alpha) > 1 - 1e-9)
-            if inside.all():
+            if inside.all() or now <= value + 1e-9 * max(1.0, abs(value)):  # a best that its box does not bind is best of all
                 found.y[active[~part]] = weight[~part]
-                return found
+                return found if now >= value else Weights(best, found.y, found.answer)
             radius *= 4
         elif now <= value:
-            radius, extra = radius / 4, extra | (missing if radius < LEAST_RADIUS else False)
+            radius, extra = radius / 4, extra | missing
         if now > value:
             best, value = found.alpha, now
 
 
-RADIUS, LEAST_RADIUS = 0.25, 1e-4
-"""Half the width of the first box; when it is below the second, missing pieces are put in for good."""
+RADIUS = 0.25
+"""Half the width of the first box."""
 
 
 @dataclass(frozen=True)

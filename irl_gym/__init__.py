@@ -3,7 +3,10 @@
     tabulate(env, gamma=...)                  an environment as an exact table: mdp, reward, states, evidence
     TabularMDP(P, gamma, d0)                  the same from arrays
     value_iteration, policy_iteration         optimal policies of a table
+    discretize(env, gamma=..., bins=...)      a continuous environment as a table of cells
     FiniteLP().fit(mdp, expert)               a reward under which the expert is optimal, with a Certificate
+    FeatureLP(phi).fit(mdp, expert)           the same as a LinearReward, alpha . phi, for large state spaces
+    TrajectoryLP(phi).fit(Simulator(env, planner, gamma), episodes)     from the expert's episodes alone
     worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns
     LearnedReward(env, reward)                the environment, paying the learned reward
     TabularEnv, TabularVecEnv                 a table as an environment, or as thousands of copies for Stable-Baselines3

@@ -7,7 +7,7 @@ column of FrozenLake's cells. Axes: N observations, d coordinates, K features.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
@@ -167,9 +167,9 @@ class Polynomial:
     @cached_property
     def exponents(self) -> np.ndarray:
         """(K, d) c, by total degree."""
-        every = _exponents(self.degree, len(self.low))
-        kept = every[every.sum(axis=1) <= self.degree]
-        return kept[np.argsort(kept.sum(axis=1), kind="stable")]
+        d = len(self.low)
+        chosen = (which for degree in range(self.degree + 1) for which in combinations_with_replacement(range(d), degree))
+        return np.array([np.bincount(np.array(which, dtype=int), minlength=d) for which in chosen])
 
     @property
     def n_features(self) -> int:

@@ -47,7 +47,8 @@ class Cells:
                 f"({', '.join(names)})."
             )
         for name, count in zip(names, bins, strict=True):
-            checked_number(f"bins of {name}", count, "a whole number of cells of at least 1", least=1, whole=True)
+            expected = "a whole number of cells of at least 1, and less than 2^62"
+            checked_number(f"bins of {name}", count, expected, least=1, below=2**62, whole=True)
         object.__setattr__(self, "bins", tuple(int(count) for count in bins))
 
     @property

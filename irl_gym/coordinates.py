@@ -60,6 +60,8 @@ class Coordinates:
         Raises:
             InvalidParameter: an unknown name, a bound that is no pair of increasing numbers, or one still missing.
         """
+        if not isinstance(bounds, Mapping):
+            raise InvalidParameter(f"bounds is {bounds!r}: expected {{name: (low, high)}} of {', '.join(self.names)}.")
         low, high = self.low.copy(), self.high.copy()
         for name, pair in bounds.items():
             if name not in self.names:

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from irl_gym._typing import Indices, Points
 from irl_gym.cells import Cells
 from irl_gym.checks import checked_number
+from irl_gym.coordinates import IntegerCoordinate
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.physics import Physics, physics_of
@@ -92,6 +93,12 @@ def discretize(
         )
     physics = physics_of(env, bounds=bounds)
     cells = Cells(physics.coordinates, bins)
+    if isinstance(physics.coordinates, IntegerCoordinate) and (cells.widths != 1).any():
+        whole = round(float((physics.coordinates.high - physics.coordinates.low)[0]))
+        raise InvalidParameter(
+            f"bins is {bins!r}, but the states are {whole} whole numbers: expected {whole} cells, or some would share one. Use "
+            "tabulate where the environment publishes its table."
+        )
     _check_size(cells, physics.n_actions, successors, samples, memory_limit)
     world = _World(physics, cells, successors, int(samples), int(seed))
     table = _assemble(world, on_progress or (lambda share: None))

@@ -72,6 +72,8 @@ def as_features(features: Any) -> FeatureMap:
     Raises:
         InvalidFeatures: neither.
     """
+    if isinstance(features, type):
+        raise InvalidFeatures(f"the features are the class {features.__name__}: expected one made of it, such as OneHot(16).")
     return features if isinstance(features, FeatureMap) else Table(features)
 
 
@@ -190,6 +192,12 @@ class Unravel:
 
     shape: tuple[int, ...]
     """Values that each coordinate can have."""
+
+    def __post_init__(self) -> None:
+        shape = self.shape if isinstance(self.shape, tuple | list) else (self.shape,)
+        for count in shape:
+            checked_number("Unravel's shape", count, "whole numbers of at least 1", least=1, whole=True, error=InvalidFeatures)
+        object.__setattr__(self, "shape", tuple(int(count) for count in shape))
 
     def __call__(self, observations: Any) -> np.ndarray:
         """(N, d) coordinates."""

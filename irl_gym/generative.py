@@ -11,7 +11,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.errors import InvalidPolicy
+from irl_gym.coordinates import IntegerCoordinate
+from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, checked_features
 from irl_gym.mdp import check_discount
 from irl_gym.physics import Physics, physics_of
@@ -43,8 +44,17 @@ class GenerativeModel:
         return physics_of(self.env, bounds=self.bounds)
 
     def states(self, n: int, rng: np.random.Generator) -> np.ndarray:
-        """(n, d) states drawn uniformly within the bounds, which should hold no terminal ones: a world does not name these."""
+        """(n, d) states drawn uniformly within the bounds, which should hold no terminal ones: a world does not name these.
+
+        Raises:
+            InvalidParameter: states that are whole numbers, among which it would draw ends.
+        """
         where = self.physics.coordinates
+        if isinstance(where, IntegerCoordinate):
+            raise InvalidParameter(
+                f"S_0 is {n}, to be drawn, but the states of {type(self.env.unwrapped).__name__} are whole numbers, some of "
+                "them ends: expected the states themselves, as (m, 1) numbers. Or use a table."
+            )
         return rng.uniform(where.low, where.high, size=(n, len(where.low)))
 
     def actions(self, policy: Policy, states: np.ndarray) -> np.ndarray:

@@ -70,14 +70,14 @@ def usable(episodes: Iterable[Episode], asked: int, limit: int | None) -> Usable
     """
     every = checked_episodes(episodes)
     cuts = [len(one) for one in every if not one.terminated and len(one) < asked]
-    shared = max(cuts, default=0)
+    shared = max(cuts, key=lambda length: (cuts.count(length), length), default=0)  # the most frequent
     if limit is None and (cuts.count(shared) > 1 or len(cuts) == len(every)):
         limit = shared
     horizon = asked if limit is None else min(asked, limit)
     kept = [one for one in every if one.terminated or len(one) >= horizon]
     if not kept:
         raise InvalidDemonstrations(
-            f"all {len(every)} episodes break off before step {horizon}, after {shared} steps at most, and none ended: "
+            f"all {len(every)} episodes break off before step {horizon}, most after {shared} steps, and none ended: "
             f"expected some that ended or go on. Ask for a shorter horizon, such as {shared}."
         )
     return Usable(kept, horizon, len(every) - len(kept))

@@ -124,6 +124,10 @@ class FeatureLP:
         return as_features(self.features)
 
     def _fit_table(self, mdp: TabularMDP, expert: Any, states: States | None) -> IRLResult[LinearReward, FeatureCertificate]:
+        if states is not None and not isinstance(states, States):
+            raise InvalidParameter(
+                f"states is {states!r}: expected a numbering, such as `tabulate(...).states`, or None for rows."
+            )
         size, decode = (mdp.n_states, _rows) if states is None else (states.n_states, states.decode_batch)
         if size != mdp.n_states:
             raise InvalidParameter(f"states has {size} states: expected {mdp.n_states}, the table's. Is it another table's?")
@@ -152,13 +156,12 @@ class FeatureLP:
         found = rows_of_model(model, expert, self.phi, S_0, samples=int(self.samples), horizon=horizon, seed=int(self.seed))
         solved = self._solve(found)
         weights = solved.weights
-        error = None
+        margin, tolerance, error = np.full(len(S_0), np.nan), np.full(len(S_0), 1e-9 * found.rows.scale), None
+        margin[found.states] = found.rows.least(weights.alpha)
         if found.batches is not None:
             spread = (found.batches @ weights.alpha).std(axis=0, ddof=1) / np.sqrt(len(found.batches))
             error = float(spread.max())
-        margin = np.full(len(S_0), np.nan)
-        margin[found.states] = found.rows.least(weights.alpha)
-        tolerance = 1e-9 * found.rows.scale + 2 * (error or 0.0)
+            tolerance[found.states] += 2 * spread[found.rows.active(weights.alpha, 1.0)[0]]
         judged = Judged(
             margin,
             np.zeros(len(S_0)),
@@ -207,7 +210,7 @@ class FeatureLP:
         if not expressible:
             expressible = most_agreement(rows, weights.alpha, **solving) > NOTHING
         bound = rows.bound(weights.y, **program)
-        if bound <= unit * rows.n_groups:
+        if bound <= min(unit, np.inf if cap is None else NOTHING * cap):
             weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
         status = weights.answer.status
         if not expressible:

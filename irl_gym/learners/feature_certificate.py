@@ -100,8 +100,8 @@ class Judged:
     """Smallest margin of each state; NaN where there is none."""
     tied: np.ndarray
     """The largest difference between actions that the expert takes in a state; 0 where it takes one."""
-    tolerance: float
-    """A violation below this is none."""
+    tolerance: float | np.ndarray
+    """A violation below this is none; one number, or one for each state."""
     constant: bool
     """Is R the same everywhere?"""
 

@@ -38,16 +38,14 @@ from irl_gym.solvers import SolverName, Status, check_solving
 
 @runtime_checkable
 class World(Protocol):
-    """A world that can be run and solved for a reward; `irl_gym.simulator.Simulator` is one."""
+    """A world that can be run and solved for a reward; `irl_gym.simulator.Simulator` is one.
+
+    It may have a `limit`, the steps after which it cuts episodes.
+    """
 
     @property
     def gamma(self) -> float:
         """Discount."""
-        ...
-
-    @property
-    def limit(self) -> int | None:
-        """Steps after which episodes are cut; None if they are not."""
         ...
 
     def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
@@ -142,7 +140,7 @@ class TrajectoryLP:
                 "Simulator(env, ValueIteration(), gamma)."
             )
         asked = least_horizon(world.gamma) if self.horizon is None else int(self.horizon)
-        expert = usable(episodes, asked, world.limit)
+        expert = usable(episodes, asked, getattr(world, "limit", None))
         horizon, r_unit = expert.horizon, self._largest(expert.episodes)
         theirs = Estimate.of(discounted_sums(expert.episodes, self.phi, world.gamma, horizon=horizon))
         found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]

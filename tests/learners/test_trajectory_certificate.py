@@ -14,7 +14,7 @@ from irl_gym.features import OneHot
 from irl_gym.learners.base import Proof
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.metrics import normalised_score, policy_value, random_value
-from irl_gym.planners import ValueIteration, tabular_actions
+from irl_gym.planners import SB3, ValueIteration, tabular_actions
 from irl_gym.rollouts import run_episodes
 from irl_gym.simulator import Simulator
 from irl_gym.tabulate import tabulate
@@ -90,7 +90,7 @@ def test_integer_features_of_coordinates_are_refused():
     cart = gym.make("CartPole-v1")
     one = Episode(np.zeros((2, 4), dtype=np.float32), np.array([0]), np.ones(1), True, False)
     with pytest.raises(InvalidFeatures, match="integers"):
-        TrajectoryLP(OneHot(4)).fit(Simulator(cart, ValueIteration(), 0.9), [one])
+        TrajectoryLP(OneHot(4)).fit(Simulator(cart, SB3(), 0.9), [one])
 
 
 def test_features_that_are_neither_map_nor_array_are_refused(unchecked):

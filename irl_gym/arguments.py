@@ -79,7 +79,8 @@ class Arguments:
             if self.learner == "feature-lp":
                 learner = FeatureLP(phi, self.sample, margin_cap=cap, l1=l1, seed=self.seed)
             else:
-                learner = TrajectoryLP(phi, l1=l1, max_rounds=self.rounds or (8 if control else 30), seed=self.seed)
+                rounds = self.rounds if self.rounds is not None else 8 if control else 30
+                learner = TrajectoryLP(phi, l1=l1, max_rounds=rounds, seed=self.seed)
         steps, shaped = self.total_timesteps, self.shaping and not control
         bins = self.bins[0] if len(self.bins) == 1 else self.bins or None
         return Experiment(

@@ -1,6 +1,7 @@
 """What the names on a command line stand for: environments, planners and features."""
 
 from collections.abc import Mapping, Sequence
+from math import comb, log10
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -21,6 +22,8 @@ FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 LearnerName = Literal["finite-lp", "feature-lp", "trajectory-lp"]
 MOST_FEATURES = 256
 """Features that a default size makes at most."""
+MOST_ALLOWED = 1 << 16
+"""Features that are made at most, whatever the size."""
 MOST_CENTRES = 15
 """Centres along a coordinate, or cosines, that a default size makes at most: those of Ng & Russell's experiment 3."""
 
@@ -63,7 +66,7 @@ def planner_named(
     ppo = algorithm == "PPO"
     settings = FOR_CONTROL.hyperparameters if control and ppo else FOR_ADVANTAGES if advantages and ppo else {}
     default = FOR_CONTROL.total_timesteps if control else SB3().total_timesteps
-    return SB3(algorithm, total_timesteps or default, settings)
+    return SB3(algorithm, default if total_timesteps is None else total_timesteps, settings)
 
 
 def features_named(
@@ -91,20 +94,33 @@ def features_named(
         return OneHot(int(space.n))
     low, high, unravel = _bounds(env, coordinates)
     d = len(low)
-    each = size or min(MOST_CENTRES, max(2, int(MOST_FEATURES ** (1 / d) + 1e-9)))
+    if size is None:
+        each = min(MOST_CENTRES, max(2, int(MOST_FEATURES ** (1 / d) + 1e-9)))
+        size = {"radial": each, "fourier": each - 1, "polynomial": 2}[name]
+    if size > 0:
+        _check_count(name, size, d)
     if name == "radial":
-        return RadialBasis.grid(low, high, each, coordinates=unravel)
-    if name == "fourier":
-        return Fourier(low, high, size or each - 1, unravel)
-    return Polynomial(low, high, size or 2, unravel)
+        return RadialBasis.grid(low, high, size, coordinates=unravel)
+    return (Fourier if name == "fourier" else Polynomial)(low, high, size, unravel)
+
+
+def _check_count(name: FeatureName, size: int, d: int) -> None:
+    """Refuse features that nobody could wait for, such as two centres along each pixel of a picture."""
+    count = comb(d + size, size) if name == "polynomial" else (size if name == "radial" else size + 1) ** d
+    if count > MOST_ALLOWED:
+        much = f"{count:,}" if count < 10**9 else f"10^{int(log10(count))}"
+        raise InvalidFeatures(
+            f"{name} features of size {size} of {d} coordinates would be {much}: expected {MOST_ALLOWED:,} at most. Choose "
+            "a smaller size, show fewer coordinates, or give features in Python."
+        )
 
 
 def _bounds(env: gym.Env, coordinates: Sequence[int] | None) -> tuple[list[float], list[float], Unravel | None]:
     """Low and high of the coordinates, and what makes them of an observation."""
     space: Any = env.observation_space
     if isinstance(space, spaces.Discrete):
-        shape = coordinates or grid_shape(env)
-        if shape is None or int(np.prod(shape)) != space.n:
+        shape = coordinates or _grid(env, int(space.n))
+        if shape is None or min(shape) < 1 or int(np.prod(shape)) != space.n:
             raise InvalidFeatures(
                 f"coordinates are {None if shape is None else list(shape)}, but observations are of {space}: expected numbers "
                 "whose product is theirs, such as 5 5 5 4 for Taxi. Name them, or choose one-hot."
@@ -118,6 +134,12 @@ def _bounds(env: gym.Env, coordinates: Sequence[int] | None) -> tuple[list[float
     if not (np.abs([low, high]) < 1e30).all():  # CartPole's velocities are unbounded, or bounded by float32's largest
         low, high = _known_bounds(env, low, high)
     return low.tolist(), high.tolist(), None
+
+
+def _grid(env: gym.Env, n: int) -> Sequence[int] | None:
+    """Rows and columns, where each cell is a state: Taxi's is a map too, but of the taxi only."""
+    shape = grid_shape(env)
+    return shape if shape is not None and int(np.prod(shape)) == n else None
 
 
 def _known_bounds(env: gym.Env, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

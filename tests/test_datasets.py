@@ -7,9 +7,9 @@ import pytest
 from gymnasium import spaces
 from minari.data_collector import EpisodeBuffer
 
-from irl_gym.datasets import minari_root, read_minari, write_minari
+from irl_gym.datasets import load_minari, minari_root, read_minari, write_minari
 from irl_gym.demonstrations import Episode, collect
-from irl_gym.errors import DatasetExists, DatasetMismatch, InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.errors import DatasetExists, DatasetMismatch, DatasetMissing, InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.policies import TabularPolicy
 from irl_gym.states import StateIndex
 
@@ -134,6 +134,32 @@ def test_continuous_actions_are_refused(tmp_path):
 def test_an_unknown_id_is_a_missing_file(tmp_path):
     with pytest.raises(FileNotFoundError):
         next(read_minari("nothing-v0", root=tmp_path))
+
+
+def test_a_missing_dataset_names_those_that_are_there(root):
+    with pytest.raises(DatasetMissing, match=f"'nothing-v0' is not under .* There are {ID}"):
+        load_minari("nothing-v0", root=root)
+
+
+def test_a_missing_dataset_says_when_there_is_none(tmp_path):
+    with pytest.raises(DatasetMissing, match=r"There is none. Name the root folder, or set MINARI_DATASETS_PATH"):
+        load_minari("nothing-v0", root=tmp_path)
+
+
+@pytest.mark.parametrize("wrong", ["no-version", "bad name-v0", ""])
+def test_a_malformed_id_is_not_looked_for(tmp_path, wrong):
+    with pytest.raises(InvalidParameter, match="malformed"):
+        load_minari(wrong, root=tmp_path)
+
+
+def test_load_minari_opens_what_was_written(root, env):
+    dataset = load_minari(ID, root=root)
+    assert dataset.total_episodes == 5 and dataset.recover_environment().spec.kwargs == env.spec.kwargs
+
+
+def test_load_minari_looks_under_the_root_in_force(root, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(root))
+    assert load_minari(ID).total_episodes == 5
 
 
 def test_dictionary_observations_come_back(tmp_path):

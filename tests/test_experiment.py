@@ -1,10 +1,18 @@
-"""Arguments of environments, as text."""
+"""What a run is asked to do: its checks, its json, and arguments of environments as text."""
+
+import json
 
 import numpy as np
 import pytest
 
+from irl_gym.bases import Fourier, RadialBasis
 from irl_gym.errors import InvalidDiscount, InvalidParameter
-from irl_gym.experiment import Experiment, parse_keywords
+from irl_gym.experiment import MOST_LISTED, Experiment, parse_keywords
+from irl_gym.features import Functions, OneHot, Table, Unravel
+from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.planners import SB3
 
 
 def lake(**kwargs):
@@ -58,3 +66,62 @@ def test_counts_that_are_not_whole_are_refused(wrong, unchecked):
 
 def test_numpys_numbers_name_the_same_experiment(unchecked):
     assert lake(seed=np.int64(3), episodes=np.int32(7)).name == lake(seed=3, episodes=7).name
+
+
+def test_neither_environment_nor_dataset_is_refused():
+    with pytest.raises(InvalidParameter, match="env_id and dataset are None"):
+        Experiment(None, 0.99)
+
+
+def test_a_dataset_is_refused_when_the_learner_needs_an_action_in_every_state():
+    with pytest.raises(InvalidParameter, match=r"the learner is FiniteLP.* Use FeatureLP or TrajectoryLP"):
+        Experiment(None, 0.99, dataset="some/data-v0", learner=FiniteLP())
+
+
+def test_a_dataset_names_the_run_when_no_environment_does():
+    asked = Experiment(None, 0.99, dataset="some/data-v0", learner=TrajectoryLP(OneHot(4)))
+    assert asked.name.startswith("some-data-v0-")
+
+
+def test_negative_samples_are_refused():
+    with pytest.raises(InvalidParameter, match="samples is -1"):
+        lake(samples=-1)
+
+
+RADIAL = RadialBasis.grid([0, 0], [1, 1], 20)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"learner": FeatureLP(OneHot(16), S_0=[1, 2], margin_cap="auto")},
+        {"learner": TrajectoryLP(RADIAL), "inner": SB3(hyperparameters={"n_steps": 8})},
+        {"learner": TrajectoryLP(np.zeros((16, 9))), "bins": (3, 4), "samples": 2},
+        {"learner": FeatureLP(Functions(np.atleast_2d, 2))},
+    ],
+)
+def test_every_experiment_is_json(asked):
+    told = json.loads(json.dumps(lake(**asked).to_json()))
+    assert told["learner"]["type"] == type(asked["learner"]).__name__ and told["gamma"] == 0.99
+
+
+def test_json_tells_the_features_and_their_numbers():
+    told = lake(learner=FeatureLP(Fourier([0, 0], [7, 7], 3, Unravel((8, 8))))).to_json()["learner"]["features"]
+    assert (told["type"], told["order"], told["coordinates"]["shape"]) == ("Fourier", 3, [8, 8])
+
+
+def test_json_tells_large_arrays_by_their_digest():
+    told = lake(learner=FeatureLP(RADIAL)).to_json()["learner"]["features"]["centres"]
+    assert told["array"] == [400, 2] and len(told["sha256"]) == 16
+
+
+def test_names_differ_when_large_features_do():
+    large = np.zeros((MOST_LISTED, 2))
+    other = large.copy()
+    other[-1, -1] = 1
+    assert lake(learner=FeatureLP(Table(large))).name != lake(learner=FeatureLP(Table(other))).name
+
+
+def test_names_differ_when_the_learner_does():
+    names = {lake(learner=one).name for one in (FeatureLP(OneHot(16)), TrajectoryLP(OneHot(16)), FiniteLP())}
+    assert len(names) == 3

@@ -20,6 +20,7 @@ from irl_gym.plotting import (
     arrival_reward,
     draw_learning_curve,
     draw_policies,
+    draw_returns,
     draw_rewards,
     draw_values,
     save_figure,
@@ -236,6 +237,21 @@ def test_draw_learning_curve_refuses_curves_of_unequal_length():
 def test_draw_learning_curve_refuses_no_curve():
     with pytest.raises(InvalidParameter, match="at least one"):
         draw_learning_curve({}, expert=1.0, random=0.0)
+
+
+def test_draw_returns_shows_every_episode_of_each_policy():
+    points = {
+        name: np.random.default_rng(i).normal(size=(n, 2)) for i, (name, n) in enumerate({"expert": 5, "random": 9}.items())
+    }
+    axis = draw_returns(points).axes[0]
+    shown = {part.get_label(): part.get_offsets() for part in axis.collections}
+    assert set(shown) == set(points) and all(np.array_equal(shown[name], points[name]) for name in points)
+
+
+def test_draw_returns_names_the_policies():
+    axis = draw_returns({"expert": np.ones((2, 2)), "random": np.zeros((1, 2))}).axes[0]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["expert", "random"]
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("true return", "return under the recovered reward")
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])

@@ -9,7 +9,7 @@ from models import models, random_model
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import InvalidParameter
 from irl_gym.rewards import TabularReward
-from irl_gym.shaping import ExpectedAdvantage, PositiveScaling, PotentialShaping, Unchanged
+from irl_gym.shaping import ExpectedAdvantage, PositiveScaling, PotentialShaping, Unchanged, typical_loss
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -88,3 +88,34 @@ def test_expected_advantage_does_not_depend_on_the_scale_of_the_reward(factor):
     model = random_model(2)
     plain, scaled = (ExpectedAdvantage(clip=0.1 * f).apply(TabularReward(f * model.R), model.mdp) for f in (1.0, factor))
     np.testing.assert_allclose(plain.values, scaled.values, atol=1e-6)
+
+
+@given(model=models())
+def test_typical_loss_is_the_median_of_what_the_second_best_action_loses(model):
+    reward = TabularReward(model.R)
+    loss = typical_loss(reward, model.mdp)
+    Q = policy_iteration(model.mdp, reward.expected(model.mdp)).Q[model.mdp.reachable & ~model.mdp.terminal]
+    losses = Q.max(axis=1, keepdims=True) - Q
+    second = np.where(losses > 1e-9, losses, np.inf).min(axis=1)
+    assert loss == (pytest.approx(np.median(second[np.isfinite(second)])) if np.isfinite(second).any() else None)
+
+
+@pytest.mark.parametrize("factor", [1e-9, 1.0, 1e9])
+def test_typical_loss_is_in_units_of_the_reward(factor):
+    model = random_model(2)
+    plain, scaled = (typical_loss(TabularReward(f * model.R), model.mdp) for f in (1.0, factor))
+    assert scaled == pytest.approx(factor * plain, rel=1e-5)
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_typical_loss_is_none_when_no_action_loses_anything(value):
+    model = random_model(0)
+    assert typical_loss(TabularReward(np.full(7, value)), model.mdp) is None
+
+
+def test_typical_loss_clips_half_of_the_losses_at_most():
+    model = random_model(5, S=10)
+    reward = TabularReward(model.R)
+    clipped = ExpectedAdvantage(typical_loss(reward, model.mdp)).apply(reward, model.mdp).values
+    second = np.sort(clipped, axis=1)[:, -2]
+    assert (second > -1).mean() == pytest.approx(0.5, abs=0.1)

@@ -94,11 +94,11 @@ def test_sums_are_cut_after_the_horizon(path, request):
     assert sums.max() == pytest.approx(1 + 0.9 + 0.81 + 0.729) and sums.min() >= 1 + 0.9
 
 
-@pytest.mark.parametrize("planner", [ValueIteration(), NoPlanner()])
-def test_sums_are_cut_by_the_time_limit(planner):
-    env = gym.make("FrozenLake-v1", max_episode_steps=2)
-    sums = Simulator(env, planner, GAMMA).sums(None, Table(np.ones((16, 1))), 50, horizon=LONG, seed=0)
-    assert sums.max() == pytest.approx(1 + 0.9 + 0.81)
+@pytest.mark.parametrize(("planner", "limit"), [(ValueIteration(), None), (NoPlanner(), 2)])
+def test_sums_are_cut_by_the_time_limit_where_the_environment_is_run(planner, limit):
+    world = Simulator(gym.make("FrozenLake-v1", max_episode_steps=2), planner, GAMMA)
+    sums = world.sums(None, Table(np.ones((16, 1))), 50, horizon=LONG, seed=0)
+    assert world.limit == limit and (sums.max() > 3) == (limit is None)
 
 
 @pytest.mark.parametrize("path", ["on_table", "stepped"])

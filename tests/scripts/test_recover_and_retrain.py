@@ -59,11 +59,33 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
         (("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true"), "NotTabular: fickle_passenger"),
         (("--env-id", "Pendulum-v1"), "NotDiscrete"),
+        (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
+        (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
+        (("--env-id", "CartPole-v1", "--learner", "trajectory-lp", "--features", "one-hot"), "choose radial"),
     ],
 )
 def test_a_mistake_gets_one_clear_line(tmp_path, arguments, says):
     made = run(*arguments, cwd=tmp_path)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
+
+
+def test_help_names_the_learners():
+    text = subprocess.run(command("--help"), capture_output=True, text=True, timeout=120).stdout
+    assert all(name in text for name in ("finite-lp", "feature-lp", "trajectory-lp", "--features", "--dataset", "--bins"))
+
+
+def test_the_report_names_the_best_round_of_trajectories(tmp_path):
+    made = run("--episodes", "10", "--retrain", "value-iteration", "--learner", "trajectory-lp", "--rounds", "2", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert all(word in made.stdout for word in ("best round", "distance", "cut after"))
+
+
+def test_a_dataset_alone_is_learned_from(finished, tmp_path):
+    (held,) = sorted((finished[1] / "runs").iterdir())[:1]
+    data = ("--dataset", "irl_gym/frozenlake-v1-expert-v0", "--dataset-root", str(held / "dataset"))
+    made = run(*data, "--learner", "feature-lp", "--retrain", "value-iteration", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "from its episodes" in " ".join(made.stdout.split())
 
 
 def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):

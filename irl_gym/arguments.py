@@ -4,11 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from gymnasium import spaces
+
 from irl_gym.choices import FeatureName, LearnerName, PlannerName, environment_of, features_named, planner_named, steps_only
 from irl_gym.experiment import Experiment, parse_keywords
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.planners import Planner
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Arguments:
     """feature-lp. States in S_0, drawn at random; the default is all."""
     rounds: int | None = None
     """trajectory-lp. At most; the default is 30 on tables, 8 on environments that are stepped."""
+    gap_cap: Literal["auto", "none"] = "none"
+    """trajectory-lp. auto lets no policy that is far worse than the expert outweigh the others."""
     inner: PlannerName | None = None
     """trajectory-lp. Who solves for each reward tried."""
     shaping: bool = True
@@ -68,24 +73,32 @@ class Arguments:
         """What the arguments ask for."""
         env_id = self.env_id or (None if self.dataset else "FrozenLake-v1")
         env_kwargs = parse_keywords(self.env_kwargs)
-        control, cap = False, None if self.margin_cap == "none" else self.margin_cap
+        control, discrete, cap = False, False, None if self.margin_cap == "none" else self.margin_cap
         if self.learner == "finite-lp":
             learner: Any = FiniteLP(l1=self.l1, margin_cap=cap, reward_on=self.reward_on, report_lambda_0=True)
         else:
             env = environment_of(env_id, env_kwargs, self.dataset, self.dataset_root)
-            control = steps_only(env) and not self.bins
+            control = not self.bins and steps_only(env)
+            discrete = isinstance(env.observation_space, spaces.Discrete)
             phi = features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
             l1: Any = self.l1
             if self.learner == "feature-lp":
                 learner = FeatureLP(phi, self.sample, margin_cap=cap, l1=l1, seed=self.seed)
             else:
                 rounds = self.rounds if self.rounds is not None else 8 if control else 30
-                learner = TrajectoryLP(phi, l1=l1, max_rounds=rounds, seed=self.seed)
-        steps, shaped = self.total_timesteps, self.shaping and not control
+                learner = TrajectoryLP(
+                    phi, gap_cap="auto" if self.gap_cap == "auto" else None, l1=l1, max_rounds=rounds, seed=self.seed
+                )
+        shaped = self.shaping and not control
+
+        def planner(name: PlannerName | None, *, advantages: bool = False) -> Planner | None:
+            if name is None and control:
+                name = "ppo"
+            return planner_named(name, self.total_timesteps, advantages=advantages, control=control, discrete=discrete)
+
         bins = self.bins[0] if len(self.bins) == 1 else self.bins or None
         return Experiment(
             env_id, self.gamma, env_kwargs, bins, self.samples, self.dataset, self.dataset_root,
-            expert=planner_named(self.expert, steps, control=control), episodes=self.episodes,
-            learner=learner, inner=planner_named(self.inner, steps, control=control), shaping=self.shaping,
-            retrain=planner_named(self.retrain, steps, control=control, advantages=shaped), seed=self.seed,
+            expert=planner(self.expert), episodes=self.episodes, learner=learner, inner=planner(self.inner),
+            shaping=self.shaping, retrain=planner(self.retrain, advantages=shaped), seed=self.seed,
         )  # fmt: skip

@@ -11,11 +11,11 @@ from gymnasium import spaces
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.coordinates import coordinates_of
 from irl_gym.datasets import load_minari
-from irl_gym.errors import DatasetMismatch, InvalidFeatures, NotSettable
+from irl_gym.errors import DatasetMismatch, InvalidFeatures, NotDiscrete, NotSettable, NotTabular
 from irl_gym.features import FeatureMap, OneHot, Unravel
 from irl_gym.layouts import grid_shape
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Algorithm, Planner, ValueIteration
-from irl_gym.tabulate import make
+from irl_gym.tabulate import make, tabulate
 
 PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
@@ -45,12 +45,21 @@ def environment_of(env_id: str | None, env_kwargs: Mapping[str, Any], dataset: s
 
 
 def steps_only(env: gym.Env) -> bool:
-    """Does an environment show coordinates, so that it has no table of its own?"""
-    return not isinstance(env.observation_space, spaces.Discrete)
+    """Has an environment no table of its own?"""
+    try:
+        tabulate(env, gamma=0.5, check_steps=0)
+    except (NotTabular, NotDiscrete):
+        return True
+    return False
 
 
 def planner_named(
-    name: PlannerName | None, total_timesteps: int | None, *, advantages: bool = False, control: bool = False
+    name: PlannerName | None,
+    total_timesteps: int | None,
+    *,
+    advantages: bool = False,
+    control: bool = False,
+    discrete: bool = False,
 ) -> Planner | None:
     """The planner of a name; None for None.
 
@@ -58,13 +67,16 @@ def planner_named(
         name: what was asked for.
         total_timesteps: environment steps of SB3; None for its default.
         advantages: is the reward an advantage between -1 and 0, on a table?
-        control: is the environment stepped itself, and shows coordinates?
+        control: is the environment stepped itself?
+        discrete: and shows numbers, not coordinates?
     """
     if name is None or name == "value-iteration":
         return None if name is None else ValueIteration()
     algorithm: Algorithm = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}[name]  # type: ignore[assignment]
     ppo = algorithm == "PPO"
-    settings = FOR_CONTROL.hyperparameters if control and ppo else FOR_ADVANTAGES if advantages and ppo else {}
+    settings = {} if not ppo or (control and discrete) else FOR_CONTROL.hyperparameters if control else {}
+    if ppo and advantages and not control:
+        settings = FOR_ADVANTAGES
     default = FOR_CONTROL.total_timesteps if control else SB3().total_timesteps
     return SB3(algorithm, default if total_timesteps is None else total_timesteps, settings)
 

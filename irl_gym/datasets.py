@@ -132,8 +132,10 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
 
     Raises:
         InvalidParameter: a malformed id.
-        FileNotFoundError: no dataset of that id under the root; those that are there are named.
+        DatasetMissing: no dataset of that id under the root; those that are there are named.
     """
+    if root is not None and not Path(root).is_dir():
+        raise DatasetMissing(f"{root} is no folder: expected Minari's root, under which {dataset_id!r} is. Name another.")
     with minari_root(root) as base:
         try:
             parse_dataset_id(dataset_id)

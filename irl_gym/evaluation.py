@@ -96,7 +96,8 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
             "worst_tie_regret_share": _plain(share),
         }
     stats = loop.stage("reward")["stats"]
-    return told | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
+    rounds = {"rounds": len(stats["rounds"])} if "rounds" in stats else {}
+    return told | rounds | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
 
 
 STATE_LISTS = ("inseparable", "marginless", "unconstrained", "violated")

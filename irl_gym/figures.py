@@ -30,9 +30,10 @@ def draw(loop: "Loop", folder: Path) -> None:
     levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
     curve = learning_curve(loop)
     pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else _of_steps(loop, loop.world)
-    pictures["learning_curve.png"] = plotting.draw_learning_curve(
-        {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])}, **levels
-    )
+    if len(curve):  # exact planning has none
+        pictures["learning_curve.png"] = plotting.draw_learning_curve(
+            {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])}, **levels
+        )
     for name, figure in pictures.items():
         plotting.save_figure(figure, folder / name)
 

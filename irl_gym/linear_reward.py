@@ -124,6 +124,16 @@ class LinearReward:
             raise InvalidReward(f"{path} holds no reward ({error}): expected a file written by LinearReward.save.") from error
 
 
+def check_savable(features: Any) -> None:
+    """Check, before anything is learned, that a file can hold features; None is fine.
+
+    Raises:
+        InvalidFeatures: code of the caller's.
+    """
+    if features is not None:
+        _pack(features, "features", {})
+
+
 def load_reward(path: str | os.PathLike) -> TabularReward | LinearReward:
     """Read a reward of either kind.
 

@@ -28,13 +28,13 @@ from irl_gym.choices import environment_of
 from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrations import Episode, empirical_policy
 from irl_gym.discretize import discretize
-from irl_gym.errors import NotDiscrete, NotTabular
+from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
 from irl_gym.learners.base import IRLResult, Learner
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.trajectory import TrajectoryLP
-from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.planners import Agent, Planner
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
@@ -73,6 +73,7 @@ class Loop:
         start = time.perf_counter()
         self.env = environment_of(experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root)
         self.world: TableWorld | SteppedWorld = self._world()
+        check_savable(getattr(experiment.learner, "features", None))
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(out, experiment.to_json())
         self.report_progress("table", 1.0)
@@ -80,6 +81,10 @@ class Loop:
     def _world(self) -> TableWorld | SteppedWorld:
         asked, env = self.experiment, self.env
         seed = asked.seed
+        if asked.bins is not None and isinstance(env.observation_space, spaces.Discrete):
+            raise InvalidParameter(
+                f"bins is {asked.bins}, but {asked.env_id} has discrete states: expected continuous ones. Leave bins out."
+            )
         if asked.bins is not None:
             method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
             table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
@@ -90,8 +95,14 @@ class Loop:
             if not isinstance(env.action_space, spaces.Discrete):
                 raise
             if not isinstance(asked.learner, TrajectoryLP):
-                raise type(error)(f"{error} Or learn from episodes alone, with TrajectoryLP.") from error
-            return SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
+                raise type(error)(
+                    f"{asked.env_id or asked.dataset} has no table: {error} For cells give bins; or learn from episodes alone, "
+                    "with TrajectoryLP (--learner trajectory-lp)."
+                ) from error
+            world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
+            for name in ("expert", "inner", "retrain"):
+                world.check(name, getattr(asked, name))
+            return world
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""

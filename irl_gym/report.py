@@ -60,7 +60,7 @@ def _reward(report: Report) -> Table:
         table.add_row(what, told)
     table.caption = (
         "worst-tie regret: what the worst policy greedy under the reward loses. " if "worst_tie_regret" in reward else ""
-    ) + _CAPTIONS[reward["learner"]]
+    ) + _CAPTIONS.get(reward["learner"], "")
     table.caption_justify = "left"
     return table
 
@@ -69,8 +69,8 @@ _CAPTIONS = {
     "FiniteLP": "lambda: price of ||R||_1; above lambda_0 R is 0. margin: how much better the expert's action is than another.",
     "FeatureLP": "sample: the states that the program compares actions in. rank: directions of alpha they say anything about.",
     "TrajectoryLP": (
-        "distance: ||V expert - V policy||_1 in the features; no reward with |alpha_i| <= 1 tells the best round's policy from "
-        "the expert by more."
+        "distance: ||V expert - V policy||_1 in the features, of the policy planned in the best round; no reward with "
+        "|alpha_i| <= 1 tells the two apart by more on these trajectories."
     ),
 }
 
@@ -79,14 +79,21 @@ def _told_of_reward(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """What is said of the reward, line by line: what all learners know, then what each one's certificate knows."""
     if not reward["status"].startswith("Optimal"):
         yield "status", reward["status"]
-    yield "expert optimal under it", "yes" if reward["expert_optimal"] else _why_not(reward)
+    best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
+    yield "expert optimal under it", best if reward["expert_optimal"] else _why_not(reward)
+    if reward["degenerate"]:
+        yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
     if "worst_tie_regret" in reward:
         share = reward["worst_tie_regret_share"]
-        of_range = "" if share is None else f", {share:.2%} of expert - random"
+        of_range = "" if share is None else f", {share:.2%} of what the expert has over random"
         yield "worst-tie regret", f"{_zero(reward['worst_tie_regret']):.4g}{of_range}"
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )
+
+
+def _told_nothing(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    return iter(())
 
 
 def _zero(value: float) -> float:
@@ -96,7 +103,7 @@ def _zero(value: float) -> float:
 
 def _why_not(reward: Mapping[str, Any]) -> str:
     if "violated_states" in reward:
-        return f"not in {reward['violated_states']:,} states, by {reward['worst_violation']:.3g} at most"
+        return f"not in {reward['violated_states']:,} state(s), by {reward['worst_violation']:.3g} at most"
     if "regret" in reward:
         return f"no: the policy planned for it gains {reward['regret']:.3g} +- {reward['regret_error']:.2g} over the expert"
     return "NO: see certificate.json"
@@ -131,10 +138,20 @@ def _told_feature(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _told_trajectory(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    yield "features", f"{reward['n_features']}, the rows have rank {reward['rank']}"
-    yield "best round", f"{reward['best_round']}, by its policy's distance to the expert"
-    yield "distance", f"{reward['distance']:.4g}, of which {reward['distance_error']:.2g} is noise"
-    yield "trajectories", f"cut after {reward['horizon']} steps, which changes a value by {reward['truncation']:.2g} at most"
+    yield "features", f"{reward['n_features']}"
+    yield "best round", f"{reward['best_round']} of {reward['rounds']}, by its policy's distance to the expert"
+    noise = (
+        "one episode tells no noise"
+        if reward["distance_error"] is None
+        else f"noise alone makes about {reward['distance_error']:.2g}"
+    )
+    yield "distance", f"{reward['distance']:.4g}; {noise}"
+    if reward["fell_short"]:
+        yield "planner", f"fell short of the expert by {-reward['regret']:.3g} under the reward it planned for"
+    yield (
+        "trajectories",
+        f"cut after {reward['horizon']} steps, which changes a value under R by {reward['truncation']:.2g} at most",
+    )
 
 
 def _stages(report: Report) -> Table:
@@ -148,6 +165,6 @@ def _stages(report: Report) -> Table:
         steps = f"{taken:,}" if taken else ""
         if name == "agent" and taken:
             crossing = training["steps_to_0.9"]
-            steps += " (not at score 0.9 to stay)" if crossing is None else f" (score 0.9 or more after {crossing:,})"
+            steps += " (did not stay at score 0.9)" if crossing is None else f" (score 0.9 or more after {crossing:,})"
         table.add_row(name, f"{record['seconds']:.1f}{' (kept)' if record.get('kept') else ''}", steps)
     return table

@@ -83,6 +83,10 @@ class RunFolder:
             found = {}
         before, now = dict(_leaves(found)), dict(_leaves(wanted))
         changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
+        if before and changed and not any((self.path / _RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
+            with self._alone():
+                write_json(known, wanted)
+            return
         if changed:
             key = changed[0]
             raise RunConflict(

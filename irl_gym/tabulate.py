@@ -106,7 +106,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
                 "the package that has it."
             ) from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
-            raise  # known, but something it needs is missing: the message says what
+            raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
         known = {id.rpartition(":")[2]: id for id in (*gym.registry, *OWN_ENVIRONMENTS)}
         close = [known[match] for match in difflib.get_close_matches(name, known, n=3, cutoff=0.5)]
         offer = f" The closest are {', '.join(close)}." if close else ""

@@ -1,8 +1,7 @@
 """Where a run of the loop takes place: a table, exact or of cells, or an environment that can only be stepped.
 
-Both train agents, run episodes and judge policies, so that the stages of the loop need not know which it is. On a table a
-policy is its actions (S,) or probabilities (S, A), and values are exact; elsewhere it is whatever has SB3's `predict`, and
-values are means of episodes.
+Both train agents, run episodes and judge policies, in the same words. On a table a policy is its actions (S,) or probabilities
+(S, A), and values are exact; elsewhere it is whatever has SB3's `predict`, and values are means of episodes.
 """
 
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
@@ -21,9 +21,9 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
-from irl_gym.rewarded_vec_env import rewarded
+from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
-from irl_gym.rollouts import run_episodes
+from irl_gym.rollouts import maker_of, run_episodes
 from irl_gym.run_folder import RunFolder
 from irl_gym.simulator import RandomPolicy
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -137,6 +137,7 @@ class SteppedWorld:
     """Of agents and episodes."""
 
     def __post_init__(self) -> None:
+        check_steppable(self.env)
         if self.env.spec is None:
             raise InvalidParameter(f"{self.env} has no spec: expected an environment that gymnasium.make made. Register it.")
 
@@ -147,20 +148,36 @@ class SteppedWorld:
         return RandomPolicy(int(space.n), np.random.default_rng(self.seed))
 
     def planner(self, *, shaped: bool) -> Planner:
-        """PPO for coordinates."""
-        return FOR_CONTROL
+        """PPO, with settings that suit the observations."""
+        return self.expert()
 
     def expert(self) -> Planner:
-        """PPO for coordinates."""
+        """PPO, with settings that suit the observations."""
+        if isinstance(self.env.observation_space, spaces.Discrete):
+            return SB3(total_timesteps=FOR_CONTROL.total_timesteps)
         return FOR_CONTROL
+
+    def check(self, name: str, planner: Planner | None) -> None:
+        """Check that a planner needs no table.
+
+        Raises:
+            InvalidParameter: ValueIteration, which does.
+        """
+        if isinstance(planner, ValueIteration):
+            raise InvalidParameter(
+                f"{name} is value-iteration, but {self.env} has no table: expected an SB3 agent, such as ppo. Or make a table "
+                "of cells with bins."
+            )
 
     def train(self, planner: Planner, reward: Any, progress: Progress = None) -> Policy:
         """A policy for a reward, the true one if None, from steps of the environment."""
-        spec: Any = self.env.spec
-        env: VecEnv = make_vec_env(lambda: gym.make(spec), self.num_envs, seed=self.seed)
+        env: VecEnv = make_vec_env(maker_of(self.env), self.num_envs, seed=self.seed)
         if reward is not None:
             env = rewarded(env, reward, self.gamma)
-        return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
+        try:
+            return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
+        finally:
+            env.close()
 
     def keep(self, policy: Policy, folder: Path, name: str) -> None:
         """Write an agent in SB3's zip."""

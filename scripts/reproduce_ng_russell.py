@@ -4,6 +4,7 @@ For example:
     python scripts/reproduce_ng_russell.py
     python scripts/reproduce_ng_russell.py --experiments 1 2 --out runs/paper
     python scripts/reproduce_ng_russell.py --quick
+
 Leaves its figures, ng_russell_2000.json and timings.json in --out. Exit code 1 if a verdict is "no".
 """
 

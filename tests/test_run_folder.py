@@ -67,7 +67,13 @@ def test_the_configuration_is_kept(folder):
     assert json.loads((folder.path / "config.json").read_text()) == CONFIG
 
 
+def test_another_configuration_takes_a_folder_in_which_nothing_was_finished(folder):
+    RunFolder(folder.path, {**CONFIG, "seed": 2})
+    assert json.loads((folder.path / "config.json").read_text())["seed"] == 2
+
+
 def test_another_configuration_is_refused_by_the_key_that_differs(folder):
+    folder.run("one", writing("x"))
     with pytest.raises(RunConflict, match="its seed is 1, this one's is 2"):
         RunFolder(folder.path, {**CONFIG, "seed": 2})
 
@@ -114,7 +120,7 @@ def test_a_folder_that_cannot_be_written_is_refused():
 
 
 def test_a_nested_difference_is_named_by_its_path(tmp_path):
-    RunFolder(tmp_path, {"learner": {"l1": 0.0, "r_max": 1.0}})
+    RunFolder(tmp_path, {"learner": {"l1": 0.0, "r_max": 1.0}}).run("one", writing("x"))
     with pytest.raises(RunConflict, match=r"its learner\.l1 is 0\.0, this one's is 1\.0"):
         RunFolder(tmp_path, {"learner": {"l1": 1.0, "r_max": 1.0}})
 

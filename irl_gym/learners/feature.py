@@ -9,7 +9,8 @@ States without another action of other successors are not counted.
 `margin_cap=tau` Departs: each margin counts up to tau only. The paper's sum buys one state's margin at the price of others',
 and pays for violations with large margins elsewhere, also where the features express a reward that makes the expert optimal.
 `margin_cap="auto"`: tau is half of the largest margin that all rows can have at once, where there is one: it is then attained
-by all, and the expert is strictly optimal in S_0. Where there is none, a tenth of the mean margin under the paper's reward.
+by all, and the expert is strictly optimal in S_0. Where there is none, a tenth of the mean margin under the paper's reward;
+and if the features still express a reward that makes the expert optimal, violations cost 1000-fold, so that none is left.
 
 Departs: an action that the expert takes too, when it takes several, has to be as good; its rows d and -d both go into the sum,
 where they cost (penalty - 1) |d|. The certificate judges all reachable states of a table, not the sample only.
@@ -29,7 +30,7 @@ from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
-from irl_gym.learners.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
+from irl_gym.learners.feature_rows import FeatureRows, chosen_states, completed, rows_of_model, rows_of_table
 from irl_gym.learners.weights import Rows, Weights, best_weights, most_agreement, uniform_margin
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
@@ -37,6 +38,8 @@ from irl_gym.policies import Policy
 from irl_gym.solvers import SolverName, Status, check_solving
 from irl_gym.states import States
 
+EXACT = 1e3
+"""Slope of p below 0 at which "auto" lets nothing pay for a violation that need not be."""
 NOTHING = 1e-8
 """An objective or a sum of margins below this, over the size of the rows, is the solvers' rounding."""
 
@@ -134,7 +137,7 @@ class FeatureLP:
         if states is None:
             check_length(self.phi, mdp.n_states)
         S_0: Any = self.S_0
-        expert, known = _completed(expert, mdp.n_states)
+        expert, known = completed(expert, mdp.n_states)
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted)
@@ -201,14 +204,20 @@ class FeatureLP:
         """The weights, what became of them, and whether some reward of the span satisfies (10)."""
         rows, unit = found.rows, NOTHING * found.rows.scale
         solving: dict[str, Any] = {"solver": self.solver, "time_limit": self.time_limit}
-        program: dict[str, Any] = {"slope": float(self.penalty), "l1": float(self.l1)}
-        cap = self._cap(rows, program, solving)
-        program["cap"] = np.inf if cap is None else cap
+        program: dict[str, Any] = {"slope": float(self.penalty), "l1": float(self.l1), "cap": np.inf}
+        cap, expressible = None if self.margin_cap == "auto" else self.margin_cap, None
+        if self.margin_cap == "auto":
+            uniform = uniform_margin(rows, **solving)
+            cap = uniform / 2 if uniform > 0 else self._typical_margin(rows, program, solving)
+            expressible = uniform > 0 or most_agreement(rows, **solving) > NOTHING
+            if expressible and not uniform > 0:
+                program["slope"] = max(program["slope"], EXACT)
+        program["cap"] = np.inf if cap is None else float(cap)
         weights = best_weights(rows, **program, **solving)
-        least = rows.least(weights.alpha)
-        expressible = bool(least.min() >= -unit and least.max() > unit)
-        if not expressible:
-            expressible = most_agreement(rows, weights.alpha, **solving) > NOTHING
+        if expressible is None:
+            least = rows.least(weights.alpha)
+            satisfied = bool(least.min() >= -unit and least.max() > unit)
+            expressible = satisfied or most_agreement(rows, weights.alpha, **solving) > NOTHING
         bound = rows.bound(weights.y, **program)
         if bound <= min(unit, np.inf if cap is None else NOTHING * cap):
             weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
@@ -217,17 +226,12 @@ class FeatureLP:
             status = Status.INEXPRESSIBLE
         elif not weights.alpha.any():
             status = Status.ZERO_WEIGHTS
-        return _Solved(weights, status, expressible, cap, rows.objective(weights.alpha, **program), bound)
+        slope, cap = program["slope"], None if cap is None else float(cap)
+        return _Solved(weights, status, expressible, slope, cap, rows.objective(weights.alpha, **program), bound)
 
-    def _cap(self, rows: Rows, program: dict[str, Any], solving: dict[str, Any]) -> float | None:
-        """tau; None for no cap."""
-        if self.margin_cap != "auto":
-            return None if self.margin_cap is None else float(self.margin_cap)
-        uniform = uniform_margin(rows, **solving)
-        if uniform > 0:
-            return uniform / 2
-        least = rows.least(best_weights(rows, **program, **solving).alpha)
-        mean = float(np.maximum(least, 0.0).mean())
+    def _typical_margin(self, rows: Rows, program: dict[str, Any], solving: dict[str, Any]) -> float | None:
+        """A tenth of the mean margin under the paper's reward; None where it is 0."""
+        mean = float(np.maximum(rows.least(best_weights(rows, **program, **solving).alpha), 0.0).mean())
         return mean / 10 if mean > NOTHING * rows.scale else None
 
     def _reward(self, weights: Weights) -> LinearReward:
@@ -244,7 +248,7 @@ class FeatureLP:
             violated=violated,
             objective=solved.objective,
             dual_bound=solved.bound,
-            penalty=float(self.penalty),
+            penalty=solved.slope,
             margin_cap=solved.cap,
             l1=float(self.l1),
             alpha_l1_norm=float(np.abs(alpha).sum()),
@@ -276,20 +280,10 @@ class _Solved:
     weights: Weights
     status: Status
     expressible: bool
+    slope: float
     cap: float | None
     objective: float
     bound: float
-
-
-def _completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
-    """An expert with random actions where nothing is known of it, and (S,) where something is."""
-    array = np.asarray(expert)
-    if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
-        return expert, np.ones(n_states, dtype=bool)
-    unknown = np.asarray(np.isnan(array).all(axis=1))
-    if unknown.all():
-        raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
-    return np.where(unknown[:, None], 1 / array.shape[1], array), np.logical_not(unknown)
 
 
 def _rows(rows: np.ndarray) -> np.ndarray:

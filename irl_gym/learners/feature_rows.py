@@ -15,7 +15,7 @@ import numpy as np
 from irl_gym.checks import checked_number
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.dynamic_programming import Discounted
-from irl_gym.errors import DegenerateExpert, InvalidParameter
+from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, over_rows
 from irl_gym.generative import GenerativeModel
 from irl_gym.learners.weights import Rows
@@ -40,6 +40,17 @@ class FeatureRows:
     """States of S_0 without a row, or with none that a reward on states can move: not counted."""
     batches: np.ndarray | None = None
     """(b, n, K) d by parts of the rollouts; None where exact or with one rollout."""
+
+
+def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
+    """An expert with random actions where nothing is known of it, and (S,) where something is."""
+    array = np.asarray(expert)
+    if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
+        return expert, np.ones(n_states, dtype=bool)
+    unknown = np.asarray(np.isnan(array).all(axis=1))
+    if unknown.all():
+        raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
+    return np.where(unknown[:, None], 1 / array.shape[1], array), np.logical_not(unknown)
 
 
 def chosen_states(

@@ -17,7 +17,7 @@ Axes: N episodes, K features.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from irl_gym.generative import least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.estimates import Estimate, nearest, usable
 from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
-from irl_gym.learners.weights import Rows, Weights, best_weights
+from irl_gym.learners.weights import Rows, Weights, best_weights, uniform_margin
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
 from irl_gym.solvers import SolverName, Status, check_solving
@@ -79,6 +79,10 @@ class TrajectoryLP:
     """`fit` stops when so many rounds in a row have not come nearer to the expert."""
     penalty: float = 2.0
     """Slope of p below 0, at least 1: the paper's 2."""
+    gap_cap: Literal["auto"] | None = None
+    """None is the paper's sum. "auto" Departs: each gap counts up to half of the largest that all policies found can have at
+    once, where there is one. A policy that loops for ever, far worse than the expert, then buys no violation by another: on
+    FrozenLake without slip "auto" recovers the expert, and the paper's sum does not; with slip it can be the worse."""
     l1: float = 0.0
     """Price of ||alpha||_1, at least 0."""
     seed: int = 0
@@ -92,6 +96,8 @@ class TrajectoryLP:
         object.__setattr__(self, "features", as_features(self.features))
         checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
         checked_number("l1", self.l1, "a number of at least 0", least=0)
+        if self.gap_cap not in (None, "auto"):
+            raise InvalidParameter(f"gap_cap is {self.gap_cap!r}: expected 'auto' or None.")
         checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
         for name in ("trajectories", "max_rounds", "patience"):
             checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
@@ -146,15 +152,15 @@ class TrajectoryLP:
         found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
         for number in range(1, self.max_rounds + 1):
             rows = Rows(theirs.mean - np.array([one.mean for one in found]), np.arange(len(found)))
-            weights = best_weights(
-                rows, slope=float(self.penalty), l1=float(self.l1), solver=self.solver, time_limit=self.time_limit
-            )
+            solving: dict[str, Any] = {"solver": self.solver, "time_limit": self.time_limit}
+            program = {"slope": float(self.penalty), "l1": float(self.l1), "cap": self._cap(rows, solving)}
+            weights = best_weights(rows, **program, **solving)
             reward = LinearReward(weights.alpha, self.phi, {"learner": "TrajectoryLP", "scaling": self.phi.scaling})
             policy = world.plan(reward, seed=self.seed + number)
             sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
             newest = Estimate.of(sums)
             cut = truncation_bound(world.gamma, horizon, r_unit)
-            certificate = self._certificate(rows, weights, theirs, found, newest, horizon, cut)
+            certificate = self._certificate(rows, weights, program, theirs, found, newest, horizon, cut)
             status = weights.answer.status if weights.alpha.any() else Status.ZERO_WEIGHTS
             stats = {
                 "round": number,
@@ -172,10 +178,23 @@ class TrajectoryLP:
         """The largest ||phi||_1 that the expert met: no reward with |alpha_i| <= 1 pays it more."""
         return max(float(np.abs(checked_features(self.phi, one.observations)).sum(axis=1).max()) for one in expert)
 
+    def _cap(self, rows: Rows, solving: dict[str, Any]) -> float:
+        """What a gap counts up to; infinite for no cap."""
+        uniform = uniform_margin(rows, **solving) if self.gap_cap == "auto" else 0.0
+        return uniform / 2 if uniform > 0 else np.inf
+
     def _certificate(
-        self, rows: Rows, weights: Weights, theirs: Estimate, found: list[Estimate], newest: Estimate, horizon: int, cut: float
+        self,
+        rows: Rows,
+        weights: Weights,
+        program: dict[str, float],
+        theirs: Estimate,
+        found: list[Estimate],
+        newest: Estimate,
+        horizon: int,
+        cut: float,
     ) -> TrajectoryCertificate:
-        alpha, slope, l1 = weights.alpha, float(self.penalty), float(self.l1)
+        alpha = weights.alpha
 
         def error(other: Estimate) -> float:
             return float(np.sqrt(theirs.variance(alpha) + other.variance(alpha)))
@@ -189,10 +208,11 @@ class TrajectoryLP:
             regret_error=error(newest),
             distance=float(np.abs(difference).sum()),
             distance_error=float(noise.sum()),
-            objective=rows.objective(alpha, slope=slope, l1=l1),
-            dual_bound=rows.bound(weights.y, slope=slope, l1=l1),
-            penalty=slope,
-            l1=l1,
+            objective=rows.objective(alpha, **program),
+            dual_bound=rows.bound(weights.y, **program),
+            penalty=program["slope"],
+            gap_cap=program["cap"] if np.isfinite(program["cap"]) else None,
+            l1=program["l1"],
             alpha_l1_norm=float(np.abs(alpha).sum()),
             rank=rows.rank,
             n_features=rows.d.shape[1],

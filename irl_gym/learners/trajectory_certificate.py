@@ -31,6 +31,8 @@ class TrajectoryCertificate:
     """No alpha has a larger objective."""
     penalty: float
     """Slope of p below 0."""
+    gap_cap: float | None
+    """What each gap counts up to; None for all of it."""
     l1: float
     """Price of ||alpha||_1."""
     alpha_l1_norm: float
@@ -54,6 +56,11 @@ class TrajectoryCertificate:
         return bool((np.append(self.gaps, -self.regret) >= -2 * errors - 1e-9).all())
 
     @property
+    def fell_short(self) -> bool:
+        """Is the planned policy worse than the expert under the reward it was planned for? Then planning failed."""
+        return self.regret < -2 * self.regret_error - 1e-9
+
+    @property
     def duality_gap(self) -> float:
         """dual_bound - objective: how far alpha can be from the optimum."""
         return self.dual_bound - self.objective
@@ -66,12 +73,13 @@ class TrajectoryCertificate:
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
         best = "yes, to two standard errors" if self.expert_optimal else "no"
+        short = "; the planner fell short of the expert" if self.fell_short else ""
         noise = f"standard errors up to {self.gap_errors.max():.2g}"
         lines = [
             f"expert best under R      {best}, of {self.gaps.size} policies found before and the one planned for R",
             f"value gaps               {self.gaps.min():.4g} to {self.gaps.max():.4g}, {noise}",
-            f"planned policy's gain    {self.regret:.4g} under R, standard error {self.regret_error:.2g}",
-            f"distance to the expert   {self.distance:.4g} in the features; {self.distance_error:.2g} is noise",
+            f"planned policy's gain    {self.regret:.4g} under R, standard error {self.regret_error:.2g}{short}",
+            f"distance to the expert   {self.distance:.4g} in the features; noise alone makes about {self.distance_error:.2g}",
             f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
             f"features                 {self.n_features}; the rows have rank {self.rank}",
             f"trajectories             cut after {self.horizon} steps, which costs a value {self.truncation:.2g} at most",
@@ -82,4 +90,4 @@ class TrajectoryCertificate:
 
     def to_json(self) -> dict[str, Any]:
         """The certificate as json holds it."""
-        return plain(self, "expert_optimal", "duality_gap", "degenerate")
+        return plain(self, "expert_optimal", "fell_short", "duality_gap", "degenerate")

@@ -57,7 +57,10 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-kwargs", "8x8"), "InvalidParameter: env-kwargs has '8x8'"),
         (("--env-kwargs", "{broken"), "InvalidParameter: env-kwargs is '{broken'"),
         (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
-        (("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true"), "NotTabular: fickle_passenger"),
+        (
+            ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true"),
+            "NotTabular: Taxi-v4 has no table: fickle_passenger",
+        ),
         (("--env-id", "Pendulum-v1"), "NotDiscrete"),
         (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
         (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),

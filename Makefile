@@ -34,6 +34,7 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
+	$(BIN)/python scripts/measure_learners.py
 	$(BIN)/python scripts/reproduce_ng_russell.py
 
 # torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.

@@ -124,8 +124,7 @@ def best_weights(
     An optimum is a vertex, at which at most K of the G concave terms have a kink; all others are linear around it. So with many
     groups the terms far from a kink are taken as their linear piece, in a box around the best weights so far, at first those of
     a sample. Each such program is a relaxation within its box; one in which no piece is missing and the box does not bind has
-    the optimum of the whole. The box grows after a program without a missing piece; after one without a
-    gain it shrinks, and the pieces that were missing stay, so the series ends.
+    the optimum of the whole. The box grows after a program without a missing piece, and shrinks after one without a gain.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
@@ -137,7 +136,7 @@ def best_weights(
     part = np.zeros(rows.n_groups, dtype=bool)
     part[np.linspace(0, rows.n_groups - 1, SAMPLE).astype(int)] = True
     best = _solve_part(rows, part, np.zeros(K), np.array([-np.ones(K), np.ones(K)]), solving).alpha
-    value, radius, extra = rows.objective(best, slope=slope, l1=l1, cap=cap), RADIUS, np.zeros_like(part)
+    value, radius, extra, stalls = rows.objective(best, slope=slope, l1=l1, cap=cap), RADIUS, np.zeros_like(part), 0
     while True:
         part = _kinks(rows, best, cap) | extra
         active, weight = rows.active(best, slope, cap)
@@ -153,13 +152,15 @@ def best_weights(
                 return found if now >= value else Weights(best, found.y, found.answer)
             radius *= 4
         elif now <= value:
-            radius, extra = radius / 4, extra | missing
+            radius, stalls = radius / 4, stalls + 1
+            if stalls > MOST_STALLS:
+                extra |= missing
         if now > value:
             best, value = found.alpha, now
 
 
-RADIUS = 0.25
-"""Half the width of the first box."""
+RADIUS, MOST_STALLS = 0.25, 30
+"""Half the width of the first box; programs without a gain, after which missing pieces stay, so that the series ends."""
 
 
 @dataclass(frozen=True)

@@ -243,7 +243,7 @@ class Outcome2:
             reported("(a) largest |R - plateau| on the road", "nearly none", np.abs(reach.R - PLATEAU).max()),
             reported("(a) steps from the farthest cell", "not said", reach.steps),
             at_least("(b) interval with R > 0, least share of runs", "all", (R[:, inside] > 0).mean(axis=1).min(), 1.0),
-            at_most("(b) largest R beyond the hump, x < 0.3", "below 0", R[:, beyond].max(), 0.0),
+            at_most("(b) second humps, x < 0.3: largest R beyond the zeros", "below 0", R[:, beyond].max(), 0.0),
             reported("(b) left zero, mean of runs", PARKING[0], humps[:, 0].mean()),
             reported("(b) right zero, mean of runs", PARKING[1], humps[:, 1].mean()),
             reported("(b) spread of the zeros over runs", "not said", float(np.ptp(humps, axis=0).max())),

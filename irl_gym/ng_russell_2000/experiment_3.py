@@ -26,6 +26,7 @@ import numpy as np
 from irl_gym.bases import RadialBasis
 from irl_gym.discretize import discretize
 from irl_gym.dynamic_programming import value_iteration
+from irl_gym.learners.estimates import nearest
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.ng_russell_2000.records import Check, Progress, at_least, at_most, near, reported
 from irl_gym.planners import ValueIteration, tabular_actions
@@ -194,15 +195,17 @@ class Curves:
     @property
     def answer(self) -> np.ndarray:
         """(k,) the round that `fit` answers with after 1, 2, ... rounds: the nearest so far."""
-        nearest = np.minimum.accumulate(self.distance)
-        return np.array([int(np.flatnonzero(self.distance[: k + 1] == nearest[k])[0]) for k in range(len(nearest))])
+        return np.array([self._after(k + 1)[0] for k in range(len(self.distance))])
 
     @property
     def stop(self) -> int:
         """The round, from 0, after which `fit` stops of itself."""
-        waited = np.arange(len(self.distance)) - self.answer
-        done = (self.distance <= self.noise) | (waited >= self.patience)
-        return int(np.argmax(done)) if done.any() else len(done) - 1
+        rounds = len(self.distance)
+        return next((k for k in range(rounds) if self._after(k + 1)[1]), rounds - 1)
+
+    def _after(self, rounds: int) -> tuple[int, bool]:
+        """The answer after some rounds, and whether `fit` stops."""
+        return nearest(self.distance[:rounds].tolist(), self.noise[:rounds].tolist(), self.patience)
 
 
 @dataclass(frozen=True, eq=False)

@@ -168,7 +168,7 @@ class Polynomial:
     def exponents(self) -> np.ndarray:
         """(K, d) c, by total degree."""
         d = len(self.low)
-        chosen = (which for degree in range(self.degree + 1) for which in combinations_with_replacement(range(d), degree))
+        chosen = (which for n in range(self.degree + 1) for which in combinations_with_replacement(range(d - 1, -1, -1), n))
         return np.array([np.bincount(np.array(which, dtype=int), minlength=d) for which in chosen])
 
     @property

@@ -152,15 +152,17 @@ def best_weights(
                 return found if now >= value else Weights(best, found.y, found.answer)
             radius *= 4
         elif now <= value:
-            radius, stalls = radius / 4, stalls + 1
-            if stalls > MOST_STALLS:
+            stalls += 1
+            if stalls > MOST_STALLS or radius < 4 * LEAST_RADIUS:  # so the series ends
                 extra |= missing
+            else:
+                radius /= 4
         if now > value:
             best, value = found.alpha, now
 
 
-RADIUS, MOST_STALLS = 0.25, 30
-"""Half the width of the first box; programs without a gain, after which missing pieces stay, so that the series ends."""
+RADIUS, LEAST_RADIUS, MOST_STALLS = 0.25, 1e-4, 30
+"""Half the width of the first box, and of the least; programs without a gain, after which missing pieces stay."""
 
 
 @dataclass(frozen=True)
@@ -255,11 +257,7 @@ def uniform_margin(rows: Rows, *, solver: SolverName = "auto", time_limit: float
         return float(np.asarray(margin.value)), float(np.asarray(margin.value)), _value(alpha)
 
     found = _generate(d, np.sign(d.mean(axis=0)), solve_part)
-    return found * rows.scale if found > UNIFORM else 0.0
-
-
-UNIFORM = 1e-7
-"""A uniform margin below this, over the size of the rows, is the solvers' rounding."""
+    return found * rows.scale if found > 1e-7 else 0.0  # below, it is the solvers' rounding
 
 
 def _generate(d: np.ndarray, alpha: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:

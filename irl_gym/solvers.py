@@ -35,7 +35,7 @@ class Status(enum.Enum):
         'certificate.lambda_0, or use l1="auto".'
     )
     ZERO_WEIGHTS = (
-        "R = 0 is optimal, alpha = 0: no reward in the span of the features is worth more than R = 0. Lower l1, or give features that "
+        "R = 0 is optimal, alpha = 0: no reward in the span of the features is worth more. Lower l1, or give features that "
         "tell the expert's successors from other actions'."
     )
     INEXPRESSIBLE = (

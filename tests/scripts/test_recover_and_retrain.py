@@ -98,7 +98,10 @@ def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
-    process = subprocess.Popen(command("--out", "run", "--episodes", "10"), cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command("--out", "run", "--episodes", "10"), cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background is born deaf to it
+    )  # fmt: skip
     deadline = time.monotonic() + 120
     while not (tmp_path / "run" / ".stages" / "reward.json").exists() and time.monotonic() < deadline:
         time.sleep(0.02)

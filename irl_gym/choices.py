@@ -20,6 +20,7 @@ from irl_gym.tabulate import make, tabulate
 PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 LearnerName = Literal["finite-lp", "feature-lp", "trajectory-lp"]
+_ALGORITHMS: dict[str, Algorithm] = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}
 MOST_FEATURES = 256
 """Features that a default size makes at most."""
 MOST_ALLOWED = 1 << 16
@@ -72,7 +73,7 @@ def planner_named(
     """
     if name is None or name == "value-iteration":
         return None if name is None else ValueIteration()
-    algorithm: Algorithm = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}[name]  # type: ignore[assignment]
+    algorithm = _ALGORITHMS[name]
     ppo = algorithm == "PPO"
     settings = {} if not ppo or (control and discrete) else FOR_CONTROL.hyperparameters if control else {}
     if ppo and advantages and not control:

@@ -14,7 +14,7 @@ from irl_gym.errors import InvalidDemonstrations
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import Functions, OneHot, Table
 from irl_gym.generative import least_horizon
-from irl_gym.learners.estimates import Estimate, nearest, usable
+from irl_gym.learners.estimates import usable
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.rewards import TabularReward
@@ -161,23 +161,6 @@ def test_trajectory_lp_standard_errors_are_calibrated():
     assert (0.75 < size).all() and (size < 1.3).all(), size
 
 
-def test_estimate_of_one_feature_keeps_its_shape():
-    one = Estimate.of(np.array([[1.0], [3.0]]))
-    assert one.mean.tolist() == [2.0] and one.variance(np.ones(1)) == pytest.approx(1.0)
-
-
-def test_estimate_of_one_episode_knows_no_error():
-    assert np.isnan(Estimate.of(np.ones((1, 3))).variances).all()
-
-
-@pytest.mark.parametrize("n", [3, 5, 40])
-def test_estimate_has_the_variances_of_numpy(n):
-    sums = np.random.default_rng(n).normal(size=(n, 5))
-    one, alpha = Estimate.of(sums), np.arange(5.0)
-    assert one.variances == pytest.approx(sums.var(axis=0, ddof=1) / n)
-    assert one.variance(alpha) == pytest.approx((sums @ alpha).var(ddof=1) / n)
-
-
 def test_trajectory_lp_states_the_bound_of_footnote_2():
     world = Chain()
     phi = np.random.default_rng(0).normal(size=(8, 2))
@@ -212,22 +195,10 @@ def test_trajectory_lp_drops_an_episode_that_broke_off():
     assert (one.certificate.horizon, one.stats["episodes_dropped"]) == (least_horizon(GAMMA), 1)
 
 
-def test_usable_keeps_to_the_limit_of_the_world():
-    assert usable(Chain().expert(3), 50, 20).horizon == 20
-
-
 def test_usable_says_what_is_missing_when_every_episode_broke_off():
     broken = [replace(one, terminated=False, truncated=True) for one in Chain().expert(3, horizon=2)]
     with pytest.raises(InvalidDemonstrations, match="shorter horizon, such as 2"):
         usable(broken, 50, 20)
-
-
-@pytest.mark.parametrize(
-    ("distances", "errors", "expected"),
-    [([3.0, 1.0], [0.1, 0.1], (1, False)), ([3.0, 1.0], [0.1, 2.0], (1, True)), ([1.0, 2.0, 3.0], [0.1] * 3, (0, True))],
-)
-def test_nearest_is_the_least_distance_until_nothing_comes_nearer(distances, errors, expected):
-    assert nearest(distances, errors, patience=2) == expected
 
 
 # --- which round, and when to stop ---

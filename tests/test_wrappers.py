@@ -11,6 +11,7 @@ from irl_gym.bases import RadialBasis
 from irl_gym.errors import InvalidFeatures, InvalidReward, NotDiscrete, UnknownObservation
 from irl_gym.features import Functions, OneHot, Unravel
 from irl_gym.linear_reward import LinearReward
+from irl_gym.listed_states import ListedStates
 from irl_gym.rewards import TabularReward
 from irl_gym.states import StateIndex
 from irl_gym.tabulate import tabulate
@@ -92,7 +93,7 @@ def test_a_reward_for_another_number_of_actions_is_refused():
 
 
 def test_an_observation_outside_the_index_is_refused():
-    states = StateIndex(spaces.Discrete(16), codes=np.array([0, 1, 5]))
+    states = ListedStates(spaces.Discrete(16), np.array([[0], [1], [5]]))
     env = LearnedReward(gym.make("FrozenLake-v1", is_slippery=False), TabularReward(np.zeros(3)), states)
     env.reset(seed=0)
     with pytest.raises(UnknownObservation, match="4"):

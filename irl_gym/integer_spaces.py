@@ -5,7 +5,7 @@ is a vector of k integers, its *numbers*. Batches are stacked as vector environm
 stack them. Axes: N observations, k numbers.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from functools import singledispatch
 from typing import Any
 
@@ -213,6 +213,34 @@ def _(space: spaces.Tuple, keys: list[Any]) -> np.ndarray:
 def _(space: spaces.Dict, keys: list[Any]) -> np.ndarray:
     columns = zip(space.spaces.values(), zip(*keys, strict=True), strict=True)
     return np.concatenate([numbers_of_keys(part, list(column)) for part, column in columns], axis=1)
+
+
+@singledispatch
+def keys_of_numbers(space: spaces.Space, numbers: np.ndarray) -> list[Any]:
+    """The keys of observations given as numbers (N, k): the inverse of `numbers_of_keys`."""
+    return [row.tobytes() for row in numbers.astype(space.dtype)]
+
+
+@keys_of_numbers.register
+def _(space: spaces.Discrete, numbers: np.ndarray) -> list[Any]:
+    return numbers[:, 0].tolist()
+
+
+@keys_of_numbers.register
+def _(space: spaces.Tuple, numbers: np.ndarray) -> list[Any]:
+    return _keys_of_parts(space.spaces, numbers)
+
+
+@keys_of_numbers.register
+def _(space: spaces.Dict, numbers: np.ndarray) -> list[Any]:
+    return _keys_of_parts(space.spaces.values(), numbers)
+
+
+def _keys_of_parts(parts: Iterable[spaces.Space], numbers: np.ndarray) -> list[Any]:
+    parts = list(parts)
+    ends = np.cumsum([len(ranges(part)) for part in parts])[:-1]
+    columns = [keys_of_numbers(part, one) for part, one in zip(parts, np.split(numbers, ends, axis=1), strict=True)]
+    return list(zip(*columns, strict=True))
 
 
 def checked_members(space: spaces.Space, numbers: np.ndarray) -> np.ndarray:

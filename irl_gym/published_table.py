@@ -15,14 +15,10 @@ import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
-from irl_gym._typing import Sparse
 from irl_gym.checks import float_array
 from irl_gym.errors import InvalidMDP, NotDiscrete, NotTabular
-from irl_gym.mdp import TabularMDP, entry_positions
-from irl_gym.rewards import TabularReward
-from irl_gym.selfcheck import Payments
 from irl_gym.states import StateIndex
-from irl_gym.tabulation import Evidence, Tabulation, moments
+from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
 
 
 def published_table(env: gym.Env, gamma: float) -> Tabulation | None:
@@ -132,26 +128,11 @@ def _assemble(entries: _Entries, d0: np.ndarray, space: spaces.Space, gamma: flo
     copy_of = np.arange(n_states)
     copy_of[both] = n_states + np.arange(both.size)
     successor[entries.terminated] = copy_of[successor[entries.terminated]]
-    size = n_states + len(copies)
     kept = ~terminal[entries.rows // n_actions]
-    shape = (size * n_actions, size)
-    rows = entries.rows[kept]
-    P = sp.coo_array((entries.probability[kept], (rows, successor[kept])), shape=shape)
-    mdp = TabularMDP(P, gamma, np.append(d0, np.zeros(len(copies))))
-    p, r = entries.probability[kept], entries.reward[kept]
-    R, deviation = moments(rows, p, r, (size, n_actions))
-    paid = _entry_rewards(mdp.P, rows, successor[kept], p, r)
-    payments = Payments(R, deviation, paid, float(np.abs(r).max(initial=0.0)))
+    lines = Lines(entries.rows[kept], successor[kept], entries.probability[kept], entries.reward[kept])
     evidence = Evidence(
         method="The table that the environment publishes as P, with terminal rows zeroed and duplicates added up.",
-        exact=True, merged=int(kept.sum()) - mdp.P.nnz, split=len(copies), check=None,
+        exact=True, merged=0, split=len(copies), check=None,
     )  # fmt: skip
-    states = StateIndex(space, terminal_copies=copies)
-    return Tabulation(mdp, TabularReward(R, {"source": "environment"}), payments, states, evidence)
-
-
-def _entry_rewards(P: Sparse, rows: np.ndarray, columns: np.ndarray, p: np.ndarray, r: np.ndarray) -> np.ndarray | None:
-    """(nnz,) rewards in the order of P.data; None where two lines of one (s, a, s') pay differently."""
-    position = entry_positions(P, rows, columns)
-    mean = np.bincount(position, weights=p * r, minlength=P.nnz) / P.data
-    return mean if np.allclose(mean[position], r, rtol=1e-9, atol=1e-12) else None
+    start = np.append(d0, np.zeros(len(copies)))
+    return from_lines(lines, start, n_actions, StateIndex(space, copies), gamma=gamma, evidence=evidence)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irl_gym.errors import InvalidMDP, UnknownObservation
-from irl_gym.integer_spaces import checked_members, key_of, numbers_of_keys, to_numbers
+from irl_gym.integer_spaces import checked_members, key_of, keys_of_numbers, numbers_of_keys, to_numbers
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.states import States
 
@@ -46,6 +46,12 @@ def test_keys_hold_the_numbers_of_observations(space):
     _, members = sampled(space)
     batch = concatenate(space, members, create_empty_array(space, len(members)))
     assert (numbers_of_keys(space, list(map(key_of(space), members))) == to_numbers(space, batch)).all()
+
+
+@every_space
+def test_numbers_give_the_keys_back(space):
+    keys = list(map(key_of(space), sampled(space)[1]))
+    assert keys_of_numbers(space, numbers_of_keys(space, keys)) == keys
 
 
 @every_space

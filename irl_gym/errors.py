@@ -13,6 +13,9 @@ IrlGymError
 ├── UnknownEnvironment         an id that is not registered; the closest names are offered
 ├── NotDiscrete                a space with infinitely many elements where finitely many are needed
 ├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
+│   ├── HiddenState            one observation that behaves in two ways: it hides part of the state
+│   └── EnumerationLimit       more states, seconds or bytes than an enumeration was allowed
+├── NotEnumerable              a call with random outcomes that cannot be listed one by one
 ├── NotSettable                an environment that cannot be set to a given state
 ├── TableMismatch              `env.step` did what the table says is impossible
 ├── DegenerateExpert           equation (4) of Ng & Russell leaves no reward that prefers the expert's actions
@@ -23,6 +26,7 @@ IrlGymError
 ├── DatasetMismatch            a dataset recorded in another environment
 ├── DatasetExists              a Minari id that is taken
 ├── DatasetMissing (also a FileNotFoundError)  a Minari id that is not there
+├── NotInstalled (also an ImportError)  an optional package that is asked for and missing
 └── RunConflict                a run folder that holds another run
 
 A message reads `what, with the value: what was expected. The mend.`
@@ -81,6 +85,18 @@ class NotTabular(IrlGymError):
     """An environment that publishes no table, or whose table is not the whole truth."""
 
 
+class NotEnumerable(IrlGymError):
+    """A call with random outcomes that cannot be listed one by one."""
+
+
+class HiddenState(NotTabular):
+    """One observation that behaves in two ways: it hides part of the state."""
+
+
+class EnumerationLimit(NotTabular):
+    """More states, seconds or bytes than an enumeration was allowed."""
+
+
 class NotSettable(IrlGymError):
     """An environment that cannot be set to a given state."""
 
@@ -119,6 +135,10 @@ class DatasetExists(IrlGymError):
 
 class DatasetMissing(IrlGymError, FileNotFoundError):
     """A Minari dataset id that is not there."""
+
+
+class NotInstalled(IrlGymError, ImportError):
+    """An optional package that is asked for and missing."""
 
 
 class RunConflict(IrlGymError):

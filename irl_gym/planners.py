@@ -105,11 +105,20 @@ class Agent:
 
     model: BaseAlgorithm
     """The model; everything SB3 offers is there."""
+    states: States | None = None
+    """Turns observations into the rows that the model was trained on; None where it was trained on observations."""
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
-        """SB3's `predict`, on one thread: networks this small are slower on more."""
+        """SB3's `predict`, on one thread: networks this small are slower on more.
+
+        Raises:
+            UnknownObservation: an observation that `states` does not hold.
+        """
+        if self.states is not None:
+            batched = self.states.is_batch(observation)
+            observation = self.states.encode_batch(observation) if batched else self.states.encode(observation)
         with _torch_threads(1):
             return self.model.predict(observation, state, episode_start, deterministic)
 
@@ -121,8 +130,13 @@ class Agent:
         beside.replace(path)
 
 
-def load_agent(path: str | os.PathLike, algorithm: Algorithm) -> Agent:
+def load_agent(path: str | os.PathLike, algorithm: Algorithm, states: States | None = None) -> Agent:
     """Load an agent from SB3's zip. Such a file can run code when loaded: load only files you trust.
+
+    Args:
+        path: the zip.
+        algorithm: "PPO", "DQN" or "A2C".
+        states: of the table, for an agent that was trained on its rows.
 
     Raises:
         FileNotFoundError: no such file.
@@ -132,7 +146,7 @@ def load_agent(path: str | os.PathLike, algorithm: Algorithm) -> Agent:
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist: expected an agent's zip, as SB3 writes it.")
     try:
-        return Agent(_algorithm(algorithm).load(path, device="cpu"))
+        return Agent(_algorithm(algorithm).load(path, device="cpu"), states)
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile, RuntimeError) as error:
         raise InvalidParameter(f"{path} holds no {algorithm} agent ({error}): expected SB3's zip of one.") from error
 
@@ -180,7 +194,7 @@ class SB3:
         settings = self._settings(env)
         with _torch_threads(self.threads):
             model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
-            agent = Agent(model)
+            agent = Agent(model, env.states if isinstance(env, TabularVecEnv) and env.shows_rows else None)
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
             model.learn(self.total_timesteps, callback=callback)
         if progress:

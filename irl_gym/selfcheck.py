@@ -7,8 +7,7 @@ A copy of the environment runs with random actions, without its TimeLimit. Three
                  Bernstein's bound
 """
 
-import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium as gym
@@ -16,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from irl_gym._typing import Matrix
+from irl_gym.copies.stripped import without_watchers
 from irl_gym.errors import NotTabular, TableMismatch
 from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.states import States
@@ -95,15 +95,11 @@ def compare_with_steps(
 
 def _copy_of(env: gym.Env) -> gym.Env:
     try:
-        return copy.deepcopy(env.unwrapped)
-    except (TypeError, AttributeError, ValueError) as error:
+        return without_watchers(env)
+    except NotTabular as error:
         if env.spec is None:
-            raise NotTabular(
-                f"{type(env.unwrapped).__name__} cannot be copied ({error}) and has no spec to make it again: the table "
-                "cannot be checked. Pass check_steps=0 to go without."
-            ) from error
-        kwargs = {**env.spec.kwargs, "render_mode": None}
-        return gym.make(env.spec.id, **kwargs).unwrapped
+            raise NotTabular(f"{error} Or pass check_steps=0 to go without the check.") from error
+        return without_watchers(gym.make(replace(env.spec, kwargs={**env.spec.kwargs, "render_mode": None})))
 
 
 def _check_start(mdp: TabularMDP, row: int) -> None:

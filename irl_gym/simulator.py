@@ -24,7 +24,7 @@ from irl_gym.policies import Policy
 from irl_gym.rewarded_vec_env import check_steppable, normalised, rewarded
 from irl_gym.rollouts import maker_of, moments_of
 from irl_gym.sampling import Successors
-from irl_gym.tabular_vec_env import TabularVecEnv
+from irl_gym.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.tabulate import tabulate
 from irl_gym.tabulation import Tabulation
 
@@ -103,7 +103,7 @@ class Simulator:
         else:
             world = TabularVecEnv(
                 table.mdp, reward.tabular(table.states), num_envs=self.num_envs, max_episode_steps=self._limit,
-                states=table.states, seed=seed,
+                states=table.states, show_rows=shows_rows(table.states), seed=seed,
             )  # fmt: skip
             if not isinstance(self.planner, ValueIteration):
                 world = normalised(world, self.gamma)

@@ -32,6 +32,8 @@ class TabularVecEnv(VecEnv):
         num_envs: number of copies N.
         max_episode_steps: truncate episodes after this many steps; None for never.
         states: turns rows into the observations of another environment; the default is the rows themselves.
+        show_rows: show rows all the same, and keep `states` for who encodes observations later: a row is what a one-hot
+            network wants, and Stable-Baselines3 takes no Tuple.
         seed: of the generator that all copies share.
 
     Raises:
@@ -47,6 +49,7 @@ class TabularVecEnv(VecEnv):
         num_envs: int = 64,
         max_episode_steps: int | None = None,
         states: States | None = None,
+        show_rows: bool = False,
         seed: int | None = None,
     ):
         reward = as_reward(reward)
@@ -61,10 +64,14 @@ class TabularVecEnv(VecEnv):
         self._rng = np.random.default_rng(seed)
         self._successors = Successors(table)
         self._limit = np.iinfo(np.int64).max if max_episode_steps is None else max_episode_steps
-        space = spaces.Discrete(table.n_states) if states is None else states.space
-        self._observations = None if states is None else states.decode_batch(np.arange(table.n_states))
-        if isinstance(self._observations, tuple):
-            raise InvalidParameter(f"the observation space is {space}: Stable-Baselines3 takes no Tuple observations.")
+        self.shows_rows = show_rows or states is None
+        shown = None if self.shows_rows else states
+        space = spaces.Discrete(table.n_states) if shown is None else shown.space
+        if isinstance(space, spaces.Tuple):
+            raise InvalidParameter(
+                f"the observation space is {space}: Stable-Baselines3 takes no Tuple observations. Use show_rows=True."
+            )
+        self._observations = None if shown is None else shown.decode_batch(np.arange(table.n_states))
         super().__init__(num_envs, space, spaces.Discrete(table.n_actions))
         self._actions = np.zeros(num_envs, dtype=np.int64)
         self._begin()
@@ -166,3 +173,9 @@ class TabularVecEnv(VecEnv):
     def get_images(self) -> Sequence[np.ndarray | None]:
         """No pictures."""
         return [None] * self.num_envs
+
+
+def shows_rows(states: States) -> bool:
+    """Are rows better shown than observations? Yes where these are several integers; not single numbers, and not floats."""
+    space = states.space
+    return not isinstance(space, spaces.Discrete) and not (isinstance(space, spaces.Box) and space.dtype.kind == "f")

@@ -1,23 +1,27 @@
 """Any discrete environment to an exact transition table.
 
-`tabulate(env, gamma=...)` asks each source in `SOURCES` in turn; today there are two, an environment that is a table
-(TabularEnv) and the table that an environment publishes. Wrappers are looked through, and a TimeLimit stays out: truncation is
-not part of an MDP. Then `env.step` is sampled and compared with the table.
+`tabulate(env, gamma=...)` asks each source in `SOURCES` in turn: an environment that is a table (TabularEnv), the table that an
+environment publishes, rules that are known (Blackjack), a model that the environment offers (gym-classics). Where none answers,
+copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out: truncation is not
+part of an MDP. Then `env.step` is sampled and compared with the table.
 """
 
 import difflib
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import gymnasium as gym
 from gymnasium import spaces
 
+from irl_gym.blackjack import blackjack_table
 from irl_gym.checks import checked_number
+from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
+from irl_gym.published_model import model_table
 from irl_gym.published_table import published_table
 from irl_gym.rewards import TabularReward
 from irl_gym.selfcheck import compare_with_steps
@@ -36,20 +40,42 @@ OWN_ENVIRONMENTS = (
 Source = Callable[[gym.Env, float], Tabulation | None]
 
 
-def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int = 0) -> Tabulation:
-    """Make the exact transition table of a discrete environment. The environment itself is neither stepped nor reset.
+@runtime_checkable
+class By(Protocol):
+    """A way to make a table that a caller asks for: `Enumeration(...)` or `Interaction(...)`."""
+
+    def table(self, env: gym.Env, gamma: float, progress: Callable[[int, int], None] | None = None, /) -> Tabulation:
+        """The table of an environment; `progress` is told how many of how many."""
+        ...
+
+
+def tabulate(
+    env: gym.Env,
+    *,
+    gamma: float,
+    by: By | None = None,
+    check_steps: int = 10_000,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Tabulation:
+    """Make the transition table of a discrete environment. The environment itself is neither stepped nor reset.
 
     Args:
-        env: a Gymnasium environment. Wrappers that only watch or limit it are looked through; LearnedReward gives its reward;
-            wrappers that change observations, actions or rewards are refused.
+        env: a Gymnasium environment. A TimeLimit and wrappers that only watch are looked through; LearnedReward gives its
+            reward; other wrappers belong to the environment.
         gamma: discount in (0, 1); no environment carries one.
-        check_steps: steps of a copy of the environment to compare with the table; 0 for none.
+        by: None for what is known of the environment, and enumeration where nothing is; `Enumeration(...)` to enumerate in
+            any case, with limits of its own; `irl_gym.interaction.Interaction(...)` to count what random steps do.
+        check_steps: steps of a copy of the environment to compare with an exact table; 0 for none.
         seed: of the check.
+        progress: called with two numbers as an enumeration goes on: states tried and found.
 
     Raises:
         InvalidDiscount: gamma outside (0, 1).
         NotDiscrete: a continuous action or observation space.
-        NotTabular: no table is published, or something acts outside it, such as a wrapper.
+        NotTabular: the environment cannot be copied, or something acts outside its table.
+        HiddenState: one observation behaves in two ways.
+        EnumerationLimit: more states than allowed.
         TableMismatch: `env.step` did what the table says is impossible.
     """
     check_discount(gamma)
@@ -57,24 +83,15 @@ def tabulate(env: gym.Env, *, gamma: float, check_steps: int = 10_000, seed: int
         raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment, such as gymnasium.make gives.")
     for name, value in (("check_steps", check_steps), ("seed", seed)):
         checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
-    learned = _learned_reward(env)
     if not isinstance(env.action_space, spaces.Discrete):
         raise NotDiscrete(
             f"the action space is {env.action_space}: expected Discrete. Discretise the actions first, as with "
             "`gymnasium.wrappers.DiscretizeAction`."
         )
-    for source in SOURCES:
-        found = source(env, gamma)
-        if found is not None:
-            break
-    else:
-        StateIndex(env.unwrapped.observation_space)  # when it is not discrete, that is the deeper reason
-        raise NotTabular(
-            f"{type(env.unwrapped).__name__} publishes no transition table: expected `env.unwrapped.P[s][a]`, a list of "
-            "(probability, successor, reward, terminated). Give the environment such a `P`, or build a TabularMDP yourself "
-            "and use TabularEnv."
-        )
-    if check_steps:
+    learned = _learned_reward(env)
+    found = next(filter(None, (source(env, gamma) for source in SOURCES)), None) if by is None else None
+    found = found or (by or Enumeration()).table(env, gamma, progress)
+    if check_steps and found.evidence.exact:
         check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
         found = replace(found, evidence=replace(found.evidence, check=check))
     return found if learned is None else _with_reward(found, learned)
@@ -117,18 +134,43 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
 
 
 def _learned_reward(env: gym.Env) -> LearnedReward | None:
-    """The outermost LearnedReward around an environment; refuses wrappers that a table knows nothing of."""
-    learned, wrapper = None, env
+    """The outermost LearnedReward around an environment.
+
+    Raises:
+        NotTabular: a wrapper around it that changes what it pays.
+    """
+    wrapper: Any = env
+    outside = []
     while isinstance(wrapper, gym.Wrapper):
         if isinstance(wrapper, LearnedReward):
-            learned = learned or wrapper
-        elif not only_watches(wrapper):
-            raise NotTabular(
-                f"the wrapper {type(wrapper).__name__} changes the environment outside its table: expected wrappers that only "
-                "watch or limit it. Tabulate `env.unwrapped`, or give the environment that change itself."
-            )
+            if outside:
+                raise NotTabular(
+                    f"the wrapper {outside[0]} around LearnedReward changes the environment: expected LearnedReward outside, "
+                    "but for wrappers that only watch or limit. Put it inside."
+                )
+            return wrapper
+        if not only_watches(wrapper):
+            outside.append(type(wrapper).__name__)
         wrapper = wrapper.env
-    return learned
+    return None
+
+
+def _plain(env: gym.Env) -> bool:
+    """Is the environment what its base is, but for wrappers that watch, and LearnedReward?"""
+    wrapper: Any = env
+    while isinstance(wrapper, gym.Wrapper):
+        if not isinstance(wrapper, LearnedReward) and not only_watches(wrapper):
+            return False
+        wrapper = wrapper.env
+    return True
+
+
+def _published(env: gym.Env, gamma: float) -> Tabulation | None:
+    return published_table(env, gamma) if _plain(env) else None
+
+
+def _model(env: gym.Env, gamma: float) -> Tabulation | None:
+    return model_table(env, gamma) if _plain(env) else None
 
 
 def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:
@@ -148,7 +190,7 @@ def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:
 def _own(env: gym.Env, gamma: float) -> Tabulation | None:
     """The table of a TabularEnv, which is one."""
     base = env.unwrapped
-    if not isinstance(base, TabularEnv):
+    if not isinstance(base, TabularEnv) or not _plain(env):
         return None
     mdp = base.mdp(gamma)
     payments = payments_of(mdp, base.reward)
@@ -157,5 +199,5 @@ def _own(env: gym.Env, gamma: float) -> Tabulation | None:
     return Tabulation(mdp, TabularReward(payments.mean, {"source": "environment"}), payments, index, evidence)
 
 
-SOURCES: tuple[Source, ...] = (_own, published_table)
+SOURCES: tuple[Source, ...] = (_own, _published, blackjack_table, _model)
 """Asked in turn for a table; the first answer is taken."""

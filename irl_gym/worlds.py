@@ -26,7 +26,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
 from irl_gym.run_folder import RunFolder
 from irl_gym.simulator import RandomPolicy
-from irl_gym.tabular_vec_env import TabularVecEnv
+from irl_gym.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.tabulation import Tabulation
 
 DEFAULT_EPISODE_STEPS = 500
@@ -79,7 +79,7 @@ class TableWorld:
         paid = self.table.reward if reward is None else self.tabular(reward)
         env = TabularVecEnv(
             self.table.mdp, paid, num_envs=self.num_envs, max_episode_steps=step_limit(self.env),
-            states=self.table.states, seed=self.seed,
+            states=self.table.states, show_rows=shows_rows(self.table.states), seed=self.seed,
         )  # fmt: skip
         return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
 

@@ -89,7 +89,7 @@ def test_self_check_starts_walks_again_that_never_end():
 def test_self_check_says_when_an_environment_cannot_be_copied():
     env = TableEnv(coin(), [1, 0])
     env.lock = threading.Lock()
-    with pytest.raises(NotTabular, match=r"TableEnv cannot be copied.*check_steps=0"):
+    with pytest.raises(NotTabular, match=r"TableEnv.lock is a lock, which cannot be copied.*check_steps=0"):
         check(env)
 
 

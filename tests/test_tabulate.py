@@ -6,7 +6,9 @@ from gymnasium.wrappers import NormalizeReward, RecordEpisodeStatistics, RepeatA
 from tiny_env import TableEnv, both_ways, coin
 
 from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import (
+    HiddenState,
     InvalidDiscount,
     InvalidMDP,
     InvalidParameter,
@@ -15,6 +17,7 @@ from irl_gym.errors import (
     NotTabular,
     UnknownEnvironment,
 )
+from irl_gym.rewards import TabularReward
 from irl_gym.tabulate import make, tabulate
 from irl_gym.wrappers import LearnedReward
 
@@ -23,15 +26,22 @@ def table_of(env, **kwargs):
     return tabulate(env, gamma=0.9, check_steps=0, **kwargs)
 
 
-class NoStart(gym.Env):
+class NoStart(TableEnv):
     """Publishes a table, but not where it starts."""
 
-    observation_space = action_space = spaces.Discrete(2)
-    P = coin()
+    def __init__(self, P):
+        super().__init__(P, None, truth_start=[1, 0])
 
 
-class PairsObserved(NoStart):
-    observation_space = spaces.Tuple([spaces.Discrete(2), spaces.Discrete(2)])
+class PairsObserved(gym.ObservationWrapper):
+    """Shows a state as a pair."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.observation_space = spaces.Tuple([spaces.Discrete(2), env.observation_space])
+
+    def observation(self, observation):
+        return 1, observation
 
 
 @pytest.mark.parametrize(
@@ -154,14 +164,43 @@ class Negated(gym.Wrapper):
         return observation, -reward, *rest
 
 
-@pytest.mark.parametrize(
-    "wrap",
-    [lambda env: TransformReward(env, lambda reward: -reward), NormalizeReward, lambda env: RepeatAction(env, 2), Negated],
-    ids=["TransformReward", "NormalizeReward", "RepeatAction", "Negated"],
-)
-def test_tabulate_refuses_a_wrapper_that_changes_the_environment_outside_its_table(wrap):
-    with pytest.raises(NotTabular, match="changes the environment outside its table"):
-        table_of(wrap(TableEnv(coin(), [1, 0])))
+@pytest.mark.parametrize("wrap", [lambda env: TransformReward(env, lambda reward: -reward), Negated])
+def test_tabulate_takes_wrappers_that_change_the_reward_for_a_part_of_the_environment(wrap):
+    plain, wrapped = table_of(TableEnv(coin(), [1, 0])), table_of(wrap(TableEnv(coin(), [1, 0])))
+    assert wrapped.reward.values[0] == pytest.approx(-plain.reward.values[0])
+
+
+def test_tabulate_takes_a_wrapper_that_repeats_actions_for_a_part_of_the_environment():
+    table = table_of(RepeatAction(gym.make("FrozenLake-v1", is_slippery=False), 2))
+    assert table.states.decode(int(table.mdp.P[[table.states.encode(0) * 4 + 2]].indices[0])) == 2
+
+
+def test_tabulate_refuses_a_reward_that_depends_on_what_was_paid_before():
+    with pytest.raises(HiddenState, match=r"NormalizeReward\."):
+        table_of(NormalizeReward(gym.make("FrozenLake-v1", is_slippery=False)))
+
+
+def test_tabulate_refuses_a_wrapper_around_a_learned_reward_that_changes_it():
+    env = LearnedReward(TableEnv(coin(), [1, 0]), TabularReward(np.zeros(2)))
+    with pytest.raises(NotTabular, match="the wrapper Negated around LearnedReward"):
+        table_of(Negated(env))
+
+
+@pytest.mark.parametrize("env", [NoStart(coin()), PairsObserved(TableEnv(coin(), [1, 0]))], ids=["no start", "pairs"])
+def test_tabulate_enumerates_what_publishes_half_a_table(env):
+    table = table_of(env)
+    assert "Enumeration of 1 states" in table.evidence.method
+    assert (table.mdp.P.toarray()[:1].tolist(), table.mdp.d0.tolist()) == ([[0.5, 0.5]], [1.0, 0.0])
+
+
+def test_tabulate_enumerates_in_any_case_when_asked():
+    assert "Enumeration" in tabulate(gym.make("FrozenLake-v1"), gamma=0.9, by=Enumeration(), check_steps=500).evidence.method
+
+
+def test_tabulate_tells_how_far_an_enumeration_is():
+    told = []
+    tabulate(gym.make("FrozenLake-v1"), gamma=0.9, by=Enumeration(), check_steps=0, progress=lambda *pair: told.append(pair))
+    assert told[-1] == (11, 11)
 
 
 @pytest.mark.parametrize("steps", [-1, 1.5, float("nan"), "10"])
@@ -231,12 +270,13 @@ def test_tabulate_refuses_a_continuous_space(env_id, offender):
 @pytest.mark.parametrize(
     ("env", "message"),
     [
-        (gym.make("Blackjack-v1"), "BlackjackEnv publishes no transition table"),
-        (gym.make("Taxi-v4", fickle_passenger=True), "fickle_passenger=True"),
-        (NoStart(), "NoStart publishes P but no start"),
-        (PairsObserved(), r"observation space is Tuple\(Discrete\(2\), Discrete\(2\)\)"),
+        (gym.make("Blackjack-v1"), r"Reveal"),
+        (
+            gym.make("Taxi-v4", fickle_passenger=True),
+            r"hides part of the state.*fickle_step: True against False.*Reveal\(env\)",
+        ),
     ],
-    ids=["no table", "fickle taxi", "no start", "pairs"],
+    ids=["naturals", "fickle taxi"],
 )
 def test_tabulate_says_what_is_missing(env, message):
     with pytest.raises(NotTabular, match=message):

@@ -11,6 +11,7 @@ GRID_WORLD = "irl_gym/GridWorld-v0"
 FOUR_ROOMS = "irl_gym/FourRooms-v0"
 MOUNTAIN_CAR = "irl_gym/MountainCar-v0"
 CONTINUOUS_GRID_WORLD = "irl_gym/ContinuousGridWorld-v0"
+MINI_GRID = "irl_gym/MiniGrid-v0"
 
 gym.register(GRID_WORLD, entry_point="irl_gym_envs.grid_world:GridWorldEnv", max_episode_steps=100)
 gym.register(FOUR_ROOMS, entry_point="irl_gym_envs.four_rooms:FourRoomsEnv", max_episode_steps=500)
@@ -25,5 +26,6 @@ gym.register(
     vector_entry_point="irl_gym_envs.continuous_grid_world:ContinuousGridWorldVectorEnv",
     max_episode_steps=50,
 )
+gym.register(MINI_GRID, entry_point="irl_gym_envs.mini_grid:MiniGridEnv", max_episode_steps=500)
 
-__all__ = ["CONTINUOUS_GRID_WORLD", "FOUR_ROOMS", "GRID_WORLD", "MOUNTAIN_CAR"]
+__all__ = ["CONTINUOUS_GRID_WORLD", "FOUR_ROOMS", "GRID_WORLD", "MINI_GRID", "MOUNTAIN_CAR"]

@@ -1,0 +1,215 @@
+"""Objects that hold objects: pickles that refer to some of them by number, and comparisons that name what differs.
+
+A pickle of an environment's attributes would copy what must stay the very same object: the environment itself, its random
+generators, its functions. `References` numbers those, and writes the number in the place of the object. `Pairs` compares
+two values part by part, and gives the dotted name of each part that differs; two graphs are alike only if they also share
+their parts alike.
+"""
+
+import enum
+import functools
+import io
+import pickle
+import types
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from irl_gym.errors import NotTabular
+
+Twin = Callable[[Any], Any | None]
+ATOMS = frozenset({int, float, bool, complex, str, bytes, type(None)})
+CODE = (type, types.FunctionType, types.ModuleType, np.ufunc)
+"""Code is no state: functions, classes and modules are shared, as copy.deepcopy shares them."""
+SEQUENCES = (list, tuple, deque)
+ABSENT = object()
+
+
+def attributes(holder: Any) -> dict[str, Any]:
+    """The attributes that an object itself holds, in `__dict__` and in `__slots__`."""
+    own = dict(getattr(holder, "__dict__", ()))
+    for name in slots(type(holder)):
+        if hasattr(holder, name):
+            own[name] = getattr(holder, name)
+    return own
+
+
+@functools.cache
+def slots(kind: type) -> tuple[str, ...]:
+    """The names of the `__slots__` of a class and its bases, as attributes are called."""
+    names = []
+    for base in kind.__mro__:
+        own = base.__dict__.get("__slots__", ())
+        for name in (own,) if isinstance(own, str) else own:
+            private = name.startswith("__") and not name.endswith("__")
+            names.append(f"_{base.__name__.lstrip('_')}{name}" if private else name)
+    return tuple(name for name in names if name not in ("__dict__", "__weakref__"))
+
+
+def children(holder: Any) -> Iterator[Any]:
+    """The objects that an object holds: keys, values, elements and attributes. Code and atoms hold none."""
+    if type(holder) in ATOMS or isinstance(holder, CODE):
+        return
+    if isinstance(holder, dict):
+        yield from holder
+        yield from holder.values()
+    elif isinstance(holder, (*SEQUENCES, set, frozenset)):
+        yield from holder
+    elif isinstance(holder, np.ndarray) and holder.dtype == object:
+        yield from holder.flat
+    yield from attributes(holder).values()
+
+
+def anew(generator: Any) -> NotTabular:
+    """The error for a generator that nobody drives."""
+    return NotTabular(
+        f"the environment made a new {type(generator).__name__} while it ran, whose draws cannot be driven: expected the "
+        "generators that it had after its first reset. Make it in __init__, and anew in reset only when a seed is given."
+    )
+
+
+class References:
+    """Pickles in which some objects are numbers: on loading, the very same objects come back.
+
+    Args:
+        twin: tells a generator, which has to be referred to before it is met, from any other object (None).
+        kinds: types of objects that are referred to when they are met first.
+    """
+
+    def __init__(self, twin: Twin, kinds: tuple[type, ...]):
+        self.objects: list[Any] = []  # only grows: earlier pickles still find what they refer to
+        self._numbers: dict[int, int] = {}
+        self._twin, self._kinds = twin, kinds
+        self._plain: set[type] = set()
+
+        self._pickler = type("Pickler", (pickle.Pickler,), {"persistent_id": staticmethod(self._lookup())})
+        self._unpickler = type("Unpickler", (pickle.Unpickler,), {"persistent_load": self.objects.__getitem__})
+
+    def dumps(self, value: Any) -> bytes:
+        """The pickle of a value. Raises what its objects raise, and NotTabular for a generator not referred to."""
+        buffer = io.BytesIO()
+        self._pickler(buffer, 5).dump(value)
+        return buffer.getvalue()
+
+    def loads(self, data: bytes) -> Any:
+        """The value of a pickle made by `dumps`: new objects, but for those referred to."""
+        return self._unpickler(io.BytesIO(data)).load()
+
+    def refer(self, one: Any) -> int:
+        """Number an object; pickles refer to it from now on."""
+        self._numbers[id(one)] = len(self.objects)
+        self.objects.append(one)
+        return len(self.objects) - 1
+
+    def refer_inside(self, value: Any) -> None:
+        """Number a value and every object inside it that could be changed or told apart."""
+        waiting, seen = [value], {id(value)}
+        while waiting:
+            one = waiting.pop()
+            if id(one) in self._numbers:
+                continue
+            if type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic):
+                self.refer(one)
+            for part in children(one):
+                if type(part) not in ATOMS and id(part) not in seen:
+                    seen.add(id(part))
+                    waiting.append(part)
+
+    def forget(self) -> None:
+        """Refer to nothing any more."""
+        self._numbers.clear()
+
+    def _lookup(self) -> Callable[[Any], int | None]:
+        """The pickler asks this for every object that it writes: a closure, since it is the inner loop of a snapshot."""
+        number_of, atoms, plain, met = self._numbers.get, ATOMS, self._plain, self._first_met
+
+        def persistent_id(one: Any) -> int | None:
+            kind = type(one)
+            if kind in atoms:
+                return None
+            number = number_of(id(one))
+            return number if number is not None or kind in plain else met(one, kind)
+
+        return persistent_id
+
+    def _first_met(self, one: Any, kind: type) -> int | None:
+        if isinstance(one, types.BuiltinFunctionType):
+            return self.refer(one) if isinstance(one.__self__, types.ModuleType | None) else None
+        if isinstance(one, self._kinds) or kind is object or (isinstance(one, np.dtype) and one.isbuiltin):
+            return self.refer(one)
+        if self._twin(one) is not None:
+            raise anew(one)
+        self._plain.add(kind)
+        return None
+
+
+class Pairs:
+    """A comparison of two graphs of objects, that remembers which object stands for which."""
+
+    def __init__(self):
+        self._forth: dict[int, int] = {}
+        self._back: dict[int, int] = {}
+
+    def unlike(self, name: str, a: Any, b: Any) -> Iterator[str]:
+        """What differs between a and b, one line a part: `grid.grid[14].is_open: True against False`."""
+        if a is b:
+            return
+        if type(a) is not type(b) or type(a) in ATOMS or isinstance(a, np.generic | enum.Enum):
+            if type(a) is not type(b) or not (a == b or (a != a and b != b)):
+                yield f"{name}: {shown(a)} against {shown(b)}"
+            return
+        if not isinstance(a, tuple | frozenset):
+            if id(a) in self._forth or id(b) in self._back:
+                if self._forth.get(id(a)) != id(b) or self._back.get(id(b)) != id(a):
+                    yield f"{name}: the same object as another attribute's, in one state only"
+                return
+            self._forth[id(a)], self._back[id(b)] = id(b), id(a)
+        yield from self._inside(name, a, b)
+
+    def _inside(self, name: str, a: Any, b: Any) -> Iterator[str]:
+        own, other = attributes(a), attributes(b)
+        if isinstance(a, dict):
+            yield from self._by_key(lambda key: f"{name}[{key!r}]", a, b)
+        elif isinstance(a, SEQUENCES) and len(a) == len(b):
+            for place, (x, y) in enumerate(zip(a, b, strict=True)):
+                yield from self.unlike(f"{name}[{place}]", x, y)
+        elif isinstance(a, np.ndarray):
+            yield from self._arrays(name, a, b)
+        elif isinstance(a, (*SEQUENCES, set, frozenset)) or not (own or other):
+            if not _equal(a, b):
+                yield f"{name}: {shown(a)} against {shown(b)}"
+        yield from self._by_key(lambda key: f"{name}.{key}", own, other)
+
+    def _by_key(self, called: Callable[[Any], str], a: dict, b: dict) -> Iterator[str]:
+        for key in dict.fromkeys([*a, *b]):
+            yield from self.unlike(called(key), a.get(key, ABSENT), b.get(key, ABSENT))
+
+    def _arrays(self, name: str, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
+        if a.dtype != b.dtype or a.shape != b.shape:
+            yield f"{name}: {a.dtype} of shape {a.shape} against {b.dtype} of shape {b.shape}"
+        elif a.dtype == object:
+            for place, x in np.ndenumerate(a):
+                yield from self.unlike(f"{name}[{', '.join(map(str, place))}]", x, b[place])
+        elif a.tobytes() != b.tobytes():
+            bytewise = (np.frombuffer(one.tobytes(), np.uint8).reshape(*one.shape, one.itemsize) for one in (a, b))
+            places = np.argwhere(np.not_equal(*bytewise).any(axis=-1))
+            first = tuple(places[0].tolist())
+            more = f", and {len(places) - 1} more" if len(places) > 1 else ""
+            yield f"{name}[{', '.join(map(str, first))}]: {shown(a[first])} against {shown(b[first])}{more}"
+
+
+def shown(value: Any) -> str:
+    """A value as one short line of text."""
+    if value is ABSENT:
+        return "absent"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _equal(a: Any, b: Any) -> bool:
+    try:
+        return bool(a == b) or pickle.dumps(a) == pickle.dumps(b)
+    except Exception:  # no comparison and no pickle: nothing shows that they are alike
+        return False

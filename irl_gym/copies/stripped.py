@@ -1,0 +1,241 @@
+"""An environment stripped of what is no part of the MDP: a copy of its own, without watchers, with driven generators.
+
+Enumeration moves an environment about at will. It needs a copy that nobody else steps, without the wrappers that only
+watch or limit (a TimeLimit counts steps, and would make a state of every count), and with each random generator
+replaced by a stand-in that the caller drives. A chain of wrappers is copied layer by layer and attribute by attribute,
+so that an attribute that cannot be copied is named.
+"""
+
+import copy
+import types
+from collections import deque
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym.copies.object_graphs import ATOMS, CODE, Twin, attributes, children
+from irl_gym.errors import NotTabular
+from irl_gym.watching import only_watches
+from irl_gym.wrappers import LearnedReward
+
+SHARED = frozenset({"spec", "metadata", "_metadata", "_cached_spec", "_saved_kwargs"})
+"""What describes a layer and never changes: neither copied nor part of a state."""
+
+
+def layers(env: gym.Env) -> list[gym.Env]:
+    """The chain of an environment, from the outermost wrapper to the unwrapped environment."""
+    chain = [env]
+    while isinstance(env, gym.Wrapper):
+        env = env.env
+        chain.append(env)
+    return chain
+
+
+def without_watchers(env: gym.Env) -> gym.Env:
+    """A deep copy of a chain of wrappers without those that only watch or limit it; a LearnedReward is left out too.
+
+    Wrappers that change observations, actions or rewards stay. The copy renders nothing: its `render_mode` is None and
+    windows are not copied. An unwrapped environment that cannot be copied but has `get_state` and `set_state` is used as
+    it is, under copied wrappers.
+
+    Raises:
+        NotTabular: an attribute cannot be copied; it is named.
+    """
+    return _copied([layer for layer in layers(env) if not _looked_through(layer)], layers(env))
+
+
+def duplicate(env: gym.Env) -> gym.Env | None:
+    """A deep copy of the whole chain, or None where the unwrapped environment cannot be copied."""
+    made = _copied(layers(env), layers(env))
+    return None if made.unwrapped is env.unwrapped else made
+
+
+def settable(env: gym.Env) -> bool:
+    """Does the unwrapped environment offer `get_state()` and `set_state(state)`?"""
+    return all(callable(getattr(env.unwrapped, name, None)) for name in ("get_state", "set_state"))
+
+
+def _looked_through(layer: gym.Env) -> bool:
+    return isinstance(layer, LearnedReward) or (isinstance(layer, gym.Wrapper) and only_watches(layer))
+
+
+def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
+    """Copies of the kept layers, the innermost first: what points to a layer left out points to the next one inside."""
+    memo: dict[int, Any] = {}
+    current: gym.Env = chain[-1]
+    for layer in reversed(chain):
+        if not any(layer is one for one in kept):
+            memo[id(layer)] = current
+            continue
+        try:
+            current = _copied_layer(layer, memo)
+        except NotTabular:
+            if layer is not chain[-1] or not settable(layer):
+                raise
+            memo[id(layer)] = current = layer
+    return current
+
+
+def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
+    kind = type(layer)
+    if hasattr(kind, "__deepcopy__"):
+        return _whole(layer, memo)
+    made: Any = object.__new__(kind)
+    tried = memo | {id(layer): made}
+    try:
+        for name, value in attributes(layer).items():
+            object.__setattr__(made, name, _copied_attribute(layer, name, value, tried))
+    except NotTabular:
+        own = ("__getstate__", "__setstate__", "__reduce__", "__reduce_ex__")
+        # EzPickle builds a fresh environment from its arguments: no copy. A class with a way of its own knows better.
+        if isinstance(layer, gym.utils.EzPickle) or all(
+            getattr(kind, name, None) is getattr(object, name, None) for name in own
+        ):
+            raise
+        return _whole(layer, memo)
+    memo.update(tried)
+    return made
+
+
+def _whole(layer: gym.Env, memo: dict[int, Any]) -> Any:
+    try:
+        made = copy.deepcopy(layer, memo)
+    except Exception as error:
+        raise NotTabular(
+            f"{type(layer).__name__} cannot be copied ({error}): expected an environment that copy.deepcopy copies. "
+            "Give it get_state() and set_state(state), or mend its __deepcopy__."
+        ) from error
+    if "render_mode" in vars(made):
+        made.render_mode = None
+    return made
+
+
+def _copied_attribute(layer: gym.Env, name: str, value: Any, memo: dict[int, Any]) -> Any:
+    if name == "render_mode":
+        return None
+    if name in SHARED:
+        return None if name == "_cached_spec" else value
+    try:
+        return copy.deepcopy(value, memo)
+    except Exception as error:
+        if _draws(value):
+            return None
+        where, culprit = _culprit(value, f"{type(layer).__name__}.{name}", layers(layer))
+        raise NotTabular(
+            f"{where} is a {type(culprit).__name__}, which cannot be copied ({error}): expected an environment that "
+            f"copy.deepcopy copies. Give {type(layer.unwrapped).__name__} get_state() and set_state(state), or a "
+            "__deepcopy__ that leaves this attribute out."
+        ) from error
+
+
+def _draws(value: Any) -> bool:
+    """Is it a window, a clock or a font (or made of them)? Nothing is rendered, so nothing needs it."""
+    held = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else [value]
+    return all(type(one).__module__.partition(".")[0] in ("pygame", "pyglet") for one in held)
+
+
+def _culprit(value: Any, where: str, known: list[Any]) -> tuple[str, Any]:
+    """The innermost object that cannot be copied, and its dotted name. Each part is tried with a memo of its own."""
+    named = (
+        list(value.items()) if isinstance(value, dict) else list(enumerate(value)) if isinstance(value, list | tuple) else []
+    )
+    parts = [(f"{where}[{key!r}]", part) for key, part in named]
+    parts += [(f"{where}.{name}", part) for name, part in attributes(value).items()]
+    for name, part in parts:
+        try:
+            copy.deepcopy(part, {id(one): one for one in known})
+        except Exception:
+            return _culprit(part, name, [*known, value])
+    return where, value
+
+
+def awaken_generators(env: gym.Env) -> None:
+    """Have the generators made that Gymnasium makes at the first draw: those of the environment and of its spaces."""
+    _ = env.unwrapped.np_random
+    waiting = [space for layer in layers(env) for space in attributes(layer).values() if isinstance(space, gym.Space)]
+    while waiting:
+        space = waiting.pop()
+        _ = space.np_random
+        for part in children(space):
+            inner = part.values() if isinstance(part, dict) else part if isinstance(part, list | tuple) else [part]
+            waiting += [one for one in inner if isinstance(one, gym.Space)]
+
+
+def replace_generators(env: gym.Env, twin: Twin) -> list[Any]:
+    """Put a stand-in in the place of every random generator that can be reached from the environment's attributes.
+
+    Attributes of each layer, of nested objects and of spaces are searched, through dicts, lists, tuples, sets, deques and
+    arrays of objects; a bound method of a generator (`self.draw = rng.random`) becomes that of its stand-in. Generators
+    that only a closure, a class attribute or a module holds are not seen.
+
+    Args:
+        env: the caller's own copy; it is changed.
+        twin: maps a generator to its stand-in, any other object to None; asked once for each generator.
+
+    Returns:
+        The stand-ins, one a generator.
+    """
+    search = _Replacing(twin)
+    search.value(env)
+    while search.waiting:
+        search.inside(search.waiting.pop())
+    return list(search.stand_ins.values())
+
+
+class _Replacing:
+    """A walk over everything that an environment holds; `value` says what belongs in a place, `inside` puts it there."""
+
+    def __init__(self, twin: Twin):
+        self.twin = twin
+        self.stand_ins: dict[int, Any] = {}
+        self.originals: list[Any] = []  # kept alive, so that no other object takes the id of a replaced generator
+        self.seen: set[int] = set()
+        self.waiting: list[Any] = []
+
+    def value(self, value: Any) -> Any:
+        if type(value) in ATOMS or isinstance(value, CODE):
+            return value
+        if id(value) in self.stand_ins:
+            return self.stand_ins[id(value)]
+        if isinstance(value, tuple | frozenset):
+            return self._rebuilt(value)
+        if isinstance(value, types.BuiltinMethodType | types.MethodType):
+            owner = self.value(value.__self__)
+            return value if owner is value.__self__ else getattr(owner, value.__name__)
+        if id(value) in self.seen:
+            return value
+        stand_in = None if isinstance(value, dict | list | set | deque) else self.twin(value)
+        if stand_in is not None:
+            self.originals.append(value)
+            self.stand_ins[id(value)] = stand_in
+            self.seen.add(id(stand_in))
+            return stand_in
+        self.seen.add(id(value))
+        self.originals.append(value)
+        self.waiting.append(value)
+        return value
+
+    def _rebuilt(self, value: Any) -> Any:
+        parts = [part if type(part) in ATOMS else self.value(part) for part in value]
+        if all(new is old for new, old in zip(parts, value, strict=True)):
+            return value
+        kind: Any = type(value)
+        return kind(*parts) if hasattr(kind, "_fields") else kind(parts)
+
+    def inside(self, holder: Any) -> None:
+        if isinstance(holder, dict | list | deque):
+            for key, old in list(holder.items() if isinstance(holder, dict) else enumerate(holder)):
+                if type(old) not in ATOMS and (new := self.value(old)) is not old:
+                    holder[key] = new
+        elif isinstance(holder, set):
+            new = {self.value(part) for part in holder}
+            if new != holder:
+                holder.clear()
+                holder.update(new)
+        elif isinstance(holder, np.ndarray) and holder.dtype == object:
+            for place in np.ndindex(holder.shape):
+                holder[place] = self.value(holder[place])
+        for name, old in attributes(holder).items():
+            if (new := self.value(old)) is not old:
+                object.__setattr__(holder, name, new)

@@ -1,0 +1,206 @@
+"""Tables from samples: what an environment did, counted, from interaction or from a dataset.
+
+The states are the observations that occur in the episodes, and a few more where one is entered both with and without
+`terminated`: then it gets a terminal copy. Truncation ends an episode, never a state: a state seen only at the end of a cut
+episode is an ordinary one in which nothing was tried. With n(s, a, s') steps seen,
+    P(s' | s, a) = (n(s, a, s') + prior) / (n(s, a) + K prior)        K successors in the support of the prior
+    d0(s)        = share of the episodes that begin in s
+The prior is on the successors seen from s under *any* action. Actions of one state mostly lead to the same few neighbours (a
+slippery floor), so that is where an unseen step may well lead; a prior on all states would make every state the neighbour of
+every other, and P dense.
+Axes: S states, A actions, N episodes.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.checks import checked_number
+from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
+from irl_gym.demonstrations import Episode, _stack
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.listed_states import ListedStates
+from irl_gym.mdp import TabularMDP, check_discount
+from irl_gym.policies import Policy
+from irl_gym.rewards import TabularReward
+from irl_gym.tabulation import Evidence, Tabulation
+from irl_gym.tally import tally
+
+Unvisited = Literal["self-loop", "uniform", "refuse"]
+
+EPISODE_STEPS = 500
+"""Steps after which `interact` cuts an episode, where the environment has no time limit."""
+MOST_ENTRIES = 1 << 26
+"""Entries of P at most that uniform rows may make: 800 MB."""
+ACTIONS = 4096
+"""Random actions drawn at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class CountedTable:
+    """A table from samples, and the counts behind it."""
+
+    table: Tabulation
+    """P, R, d0 and the states."""
+    counts: Counts
+    """Visits, and what they settle."""
+
+
+@dataclass(frozen=True)
+class Counting:
+    """How episodes become a table.
+
+    Raises:
+        InvalidParameter: a negative prior, or an unknown rule.
+    """
+
+    prior: float = 0.0
+    """Dirichlet's concentration, at least 0, of each successor seen from a state under any action; 0 for maximum likelihood.
+    It counts in visited pairs only: unvisited ones follow the rule below. A step that only the prior allows pays what the same
+    states were paid under other actions."""
+    unvisited: Unvisited = "self-loop"
+    """What follows a pair (s, a) that no episode has: s itself; any state that is not terminal, uniformly; or an error. Such
+    steps pay the least reward of all episodes, so that nobody gains by going where nothing is known."""
+
+    def __post_init__(self) -> None:
+        checked_number("prior", self.prior, "a concentration of at least 0, such as 0.5", least=0)
+        if self.unvisited not in get_args(Unvisited):
+            raise InvalidParameter(f"unvisited is {self.unvisited!r}: expected one of {', '.join(get_args(Unvisited))}.")
+
+    def table(self, episodes: Iterable[Episode], space: spaces.Space, n_actions: int, *, gamma: float) -> Tabulation:
+        """The table of episodes; arguments and errors as `count`."""
+        return self.count(episodes, space, n_actions, gamma=gamma).table
+
+    def count(self, episodes: Iterable[Episode], space: spaces.Space, n_actions: int, *, gamma: float) -> CountedTable:
+        """The table of episodes, and the counts behind it.
+
+        Args:
+            episodes: at least one; they may come from a generator, and are read once.
+            space: of the observations, made of integers.
+            n_actions: A; actions count from 0.
+            gamma: discount in (0, 1).
+
+        Raises:
+            InvalidDiscount: gamma outside (0, 1).
+            InvalidParameter: fewer than 1 actions, or uniform rows that would not fit into memory.
+            NotDiscrete: observations that are not integers.
+            InvalidDemonstrations: no episode, an action out of range, a reward that is not finite; a pair never visited, where
+                those are refused.
+            UnknownObservation: an observation outside the space.
+        """
+        check_discount(gamma)
+        checked_number("n_actions", n_actions, "a whole number of at least 1", least=1, whole=True)
+        seen = tally(episodes, space, int(n_actions))
+        n = len(seen.numbers)
+        both = np.flatnonzero(seen.ordinary & seen.ended)
+        copies = {int(s): n + i for i, s in enumerate(both)}
+        states = ListedStates(space, seen.numbers, copies)
+        acting = np.append(seen.ordinary, np.zeros(both.size, dtype=bool))
+        entries, visits = seen_entries(seen, states, int(n_actions))
+        if self.prior:
+            entries = supported(entries, visits, self.prior)
+        missing = np.flatnonzero(np.repeat(acting, n_actions) & (visits.ravel() == 0))
+        if missing.size:
+            entries = self._completed(entries, missing, acting, states, float(seen.paid[:, 2].min()))
+        P, successors = entries.matrices(visits)
+        counts = Counts(visits, successors, float(self.prior))
+        d0 = np.append(seen.started, np.zeros(both.size)) / seen.n_episodes
+        total = int(acting.sum()) * int(n_actions)
+        payments = entries.payments(P.data, visits.shape)
+        method = (
+            f"Counts of {int(visits.sum())} steps in {seen.n_episodes} episodes, which visit {total - missing.size} of {total} "
+            f"pairs (s, a) of states that are not terminal; prior {self.prior:g}, unvisited pairs: {self.unvisited}."
+        )
+        evidence = Evidence(method, exact=False, merged=0, split=len(copies), check=None, error=counts.largest_error())
+        reward = TabularReward(payments.mean, {"source": "samples"})
+        table = Tabulation(TabularMDP(P, gamma, d0), reward, payments, states, evidence)
+        return CountedTable(table, counts)
+
+    def _completed(
+        self, entries: Entries, missing: np.ndarray, acting: np.ndarray, states: ListedStates, least: float
+    ) -> Entries:
+        """The entries with rows for pairs that were never visited."""
+        n_actions = entries.n_actions
+        if self.unvisited == "refuse":
+            s, a = divmod(int(missing[0]), n_actions)
+            shown = states.numbers[s].tolist()
+            raise InvalidDemonstrations(
+                f"{missing.size} of {int(acting.sum()) * n_actions} pairs (s, a) were never visited, the first (s={s}, a={a}) "
+                f"with observation {shown[0] if len(shown) == 1 else shown}: expected every action in every state. Give more "
+                "episodes, or choose what follows such a pair: unvisited='self-loop' or 'uniform'."
+            )
+        everywhere = np.flatnonzero(acting)
+        if self.unvisited == "self-loop":
+            rows, following = missing, missing // n_actions
+        elif missing.size * everywhere.size > MOST_ENTRIES:
+            raise InvalidParameter(
+                f"unvisited is 'uniform', which makes {missing.size} rows of {everywhere.size} entries: expected no more than "
+                f"{MOST_ENTRIES} entries. Choose 'self-loop'."
+            )
+        else:
+            rows, following = np.repeat(missing, everywhere.size), np.tile(everywhere, missing.size)
+        share = np.full(rows.size, 1 / everywhere.size if self.unvisited == "uniform" else 1.0)
+        pays = np.full(rows.size, least)
+        return entries.joined(rows, following, share, pays, pays**2)
+
+
+def interact(env: gym.Env, steps: int, *, seed: int, policy: Policy | None = None) -> Iterator[Episode]:
+    """Run an environment for some steps, an episode at a time, from its own resets.
+
+    The first reset is seeded, and the others go on from there. Episodes are cut at the environment's time limit, or after
+    EPISODE_STEPS where it has none; the last one where the steps are up.
+
+    Args:
+        env: any Gymnasium environment with integer actions; itself stepped.
+        steps: in all; at least 1.
+        seed: of the first reset and of random actions.
+        policy: with SB3's `predict`, not deterministic, actions counted from 0; None for uniformly random actions.
+
+    Raises:
+        NotDiscrete: other actions.
+        InvalidParameter: fewer than 1 steps, or a negative seed.
+    """
+    if not isinstance(env.action_space, spaces.Discrete):
+        raise NotDiscrete(f"the action space is {env.action_space}: expected Discrete. Discretise the actions first.")
+    checked_number("steps", steps, "a number of steps of at least 1", least=1, whole=True)
+    checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True)
+    rng = np.random.default_rng([int(seed), 1])  # not the stream of the environment's own generator
+    choose = _random_actions(int(env.action_space.n), rng) if policy is None else _actions_of(policy)
+    return _episodes(env, int(steps), int(seed), choose)
+
+
+def _random_actions(n_actions: int, rng: np.random.Generator) -> Callable[[Any], int]:
+    def stream() -> Iterator[int]:
+        while True:
+            yield from rng.integers(n_actions, size=ACTIONS).tolist()
+
+    actions = stream()
+    return lambda observation: next(actions)
+
+
+def _actions_of(policy: Policy) -> Callable[[Any], int]:
+    return lambda observation: int(policy.predict(observation, deterministic=False)[0])
+
+
+def _episodes(env: gym.Env, steps: int, seed: int, choose: Callable[[Any], int]) -> Iterator[Episode]:
+    limit = (env.spec.max_episode_steps if env.spec is not None else None) or EPISODE_STEPS
+    first = int(getattr(env.action_space, "start", 0))
+    left, begin = steps, seed
+    while left:
+        observation, _ = env.reset(seed=begin)
+        observations, actions, rewards = [observation], [], []
+        terminated = truncated = False
+        while not (terminated or truncated):
+            action = choose(observation)
+            observation, reward, terminated, truncated, _ = env.step(action + first)
+            observations.append(observation)
+            actions.append(action)
+            rewards.append(float(reward))
+            truncated = truncated or (not terminated and len(actions) in (limit, left))
+        left -= len(actions)
+        yield Episode(_stack(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), begin)
+        begin = None

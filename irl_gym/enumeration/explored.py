@@ -1,0 +1,159 @@
+"""What an enumeration has found so far: states, how each was reached, and what each action does there.
+
+States are numbered as they are found. A state that is entered with `terminated` is an *end*, of its own numbering: the same
+observation can be both. How a state was reached is kept as a path of draws, not as a copy of the environment, so a file of it
+holds numbers only, and whoever continues from it plays those paths again.
+
+Axes: n states, e ends, m lines; a line is a successor of a pair (state, action) with its probability and reward.
+"""
+
+import json
+import os
+import zipfile
+from array import array
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.errors import RunConflict
+from irl_gym.integer_spaces import keys_of_numbers, numbers_of_keys
+
+Script = tuple[int, ...]
+"""Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
+
+
+class Explored:
+    """States, ends and lines found so far; it grows.
+
+    Args:
+        n_actions: A.
+    """
+
+    def __init__(self, n_actions: int):
+        self.n_actions = n_actions
+        self.ids: dict[Hashable, int] = {}
+        self.ends: dict[Hashable, int] = {}
+        self.parents, self.actions = array("q"), array("q")
+        self.scripts: list[Script] = []
+        self.rows, self.successors = array("q"), array("q")
+        self.probabilities, self.rewards = array("d"), array("d")
+        self.first_line = array("q", [0])
+        """Where the lines of each state begin, in the order of the numbers."""
+        self.starts: dict[int, float] = {}
+        self.counted: dict[str, int] = {"rows": 0, "runs": 0, "lines": 0}
+        """Pairs (and starts) whose draws could not be enumerated, the runs made of them, and the lines they gave."""
+        self.keys: list[Hashable] = []
+
+    @property
+    def n_expanded(self) -> int:
+        """States whose actions have been tried."""
+        return len(self.first_line) - 1
+
+    def add(self, key: Hashable, parent: int, action: int, script: Script) -> int:
+        """Number a new state; the parent of a start is -1."""
+        number = self.ids[key] = len(self.keys)
+        self.keys.append(key)
+        self.parents.append(parent)
+        self.actions.append(action)
+        self.scripts.append(script)
+        return number
+
+    def end(self, key: Hashable) -> int:
+        """The successor that stands for an end: -1 - its number."""
+        return -1 - self.ends.setdefault(key, len(self.ends))
+
+    def expand(self, number: int, lines: list[tuple[int, int, float, float]]) -> None:
+        """Add the lines of the next state: action, successor, probability, reward."""
+        for action, successor, probability, reward in lines:
+            self.rows.append(number * self.n_actions + action)
+            self.successors.append(successor)
+            self.probabilities.append(probability)
+            self.rewards.append(reward)
+        self.first_line.append(len(self.rows))
+
+    def lines_of(self, number: int) -> list[tuple[int, int, float, float]]:
+        """The lines of an expanded state: action, successor, probability, reward."""
+        part = slice(self.first_line[number], self.first_line[number + 1])
+        actions = [row - number * self.n_actions for row in self.rows[part]]
+        return list(zip(actions, self.successors[part], self.probabilities[part], self.rewards[part], strict=True))
+
+    def path(self, number: int) -> list[int]:
+        """The states on the way to a state, a start first."""
+        way = [number]
+        while self.parents[way[-1]] >= 0:
+            way.append(self.parents[way[-1]])
+        return way[::-1]
+
+    def way(self, number: int) -> list[int]:
+        """The actions on the way to a state."""
+        return [self.actions[one] for one in self.path(number)[1:]]
+
+    @property
+    def size(self) -> int:
+        """Bytes held, about: keys and their places, ways and lines."""
+        return 300 * len(self.keys) + 32 * len(self.rows) + 150 * len(self.ends)
+
+    def save(self, path: Path, space: spaces.Space, identity: dict[str, Any]) -> None:
+        """Write everything; beside first, then renamed."""
+        lengths = np.array([len(script) for script in self.scripts], dtype=np.int64)
+        k = len(numbers_of_keys(space, self.keys[:1])[0])
+        ends = numbers_of_keys(space, list(self.ends)) if self.ends else np.zeros((0, k), dtype=np.int64)
+        beside = path.with_name(f".{path.name}.tmp.npz")
+        np.savez(
+            beside,
+            identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(self.counted)),
+            states=numbers_of_keys(space, self.keys), ends=ends,
+            parents=np.array(self.parents), actions=np.array(self.actions),
+            script_lengths=lengths, scripts=np.array([one for script in self.scripts for one in script], dtype=np.int64),
+            rows=np.array(self.rows), successors=np.array(self.successors),
+            probabilities=np.array(self.probabilities), rewards=np.array(self.rewards),
+            first_line=np.array(self.first_line),
+            start_numbers=np.array(list(self.starts), dtype=np.int64), start_values=np.array(list(self.starts.values())),
+        )  # fmt: skip
+        os.replace(beside, path)
+
+
+def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dict[str, Any]) -> Explored:
+    """What `Explored.save` wrote.
+
+    Raises:
+        RunConflict: a file of another environment or of other settings, or none that can be read.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+        asked = json.loads(str(found["identity"]))
+        explored = _rebuilt(found, space, n_actions)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise RunConflict(
+            f"{path} holds no enumeration ({error}): expected one to continue. Remove it to begin anew."
+        ) from error
+    if asked != json.loads(json.dumps(identity, sort_keys=True)):
+        different = sorted(name for name in {*asked, *identity} if asked.get(name) != identity.get(name))
+        raise RunConflict(
+            f"{path} holds the enumeration of something else (other: {', '.join(different)}): expected the same environment "
+            "and settings. Name another file, or remove it to begin anew."
+        )
+    return explored
+
+
+def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) -> Explored:
+    explored = Explored(n_actions)
+    keys = keys_of_numbers(space, found["states"])
+    stops = np.cumsum(found["script_lengths"])
+    scripts = [tuple(part.tolist()) for part in np.split(found["scripts"], stops[:-1])]
+    for one, parent, action, script in zip(keys, found["parents"].tolist(), found["actions"].tolist(), scripts, strict=True):
+        explored.add(one, parent, action, script)
+    for one in keys_of_numbers(space, found["ends"]):
+        explored.end(one)
+    for name in ("rows", "successors"):
+        setattr(explored, name, array("q", found[name].astype(np.int64).tolist()))
+    for name in ("probabilities", "rewards"):
+        setattr(explored, name, array("d", found[name].astype(float).tolist()))
+    explored.first_line = array("q", found["first_line"].tolist())
+    explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
+    explored.counted = json.loads(str(found["counted"]))
+    return explored

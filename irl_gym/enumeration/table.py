@@ -1,0 +1,212 @@
+"""The table of any environment that can be copied, by enumeration of its states.
+
+The published `P` is not needed: the environment itself is stepped, from copies of it, through every outcome of its draws. What
+is found is exact, unless some draws cannot be enumerated (a normal number, more outcomes than are allowed, a generator that is
+not the environment's own): those steps are run many times and counted, and the evidence says how far the counts can be off.
+"""
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym.checks import checked_number
+from irl_gym.copies.snapshots import ConstantChanged
+from irl_gym.copies.stripped import without_watchers
+from irl_gym.enumeration.explored import Explored, load_explored
+from irl_gym.enumeration.explorer import Explorer
+from irl_gym.enumeration.limits import Limits
+from irl_gym.enumeration.trials import OutsideRandomness
+from irl_gym.errors import HiddenState
+from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
+from irl_gym.listed_states import ListedStates, in_order
+from irl_gym.reveal import known_hidden
+from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
+
+OnStates = Callable[[int, int], None]
+"""Called with the number of states tried and found, as the search goes on."""
+GUARDED = 500
+"""States tried between two looks at what was held to be constant."""
+
+
+@dataclass(frozen=True)
+class Enumeration(Limits):
+    """How the states of an environment are enumerated.
+
+    Raises:
+        InvalidParameter: a field outside its range.
+    """
+
+    checkpoint: str | os.PathLike | None = None
+    """A file (.npz) that the search is kept in, and continued from if it is there; None for none."""
+    every: float = 20.0
+    """Seconds between two writings of it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checked_number("every", self.every, "seconds, at least 0", least=0)
+
+    def table(self, env: gym.Env, gamma: float, progress: OnStates | None = None, /) -> Tabulation:
+        """Enumerate the states of an environment; it is copied, neither stepped nor reset.
+
+        Args:
+            env: with integer observations and Discrete actions. Wrappers belong to it, but for those that only watch or limit.
+            gamma: discount.
+            progress: told how far it is.
+
+        Raises:
+            NotDiscrete: an observation space that is not made of integers.
+            NotTabular: it cannot be copied, or raises an error.
+            HiddenState: one observation behaves in two ways.
+            EnumerationLimit: more states, seconds or bytes than allowed.
+            RunConflict: a checkpoint of something else.
+        """
+        ranges(env.observation_space)  # refuses floats before anything is copied
+        explored, compared = self._explore(env, progress or (lambda tried, found: None))
+        return _assembled(explored, env, gamma, compared, self.runs)
+
+    def _explore(self, env: gym.Env, on_states: OnStates) -> tuple[Explored, int]:
+        """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
+        always: frozenset[str] = frozenset()
+        counting = False
+        while True:
+            explored = None
+            if self.checkpoint is not None and Path(self.checkpoint).exists():
+                space: Any = env.action_space
+                explored = load_explored(Path(self.checkpoint), env.observation_space, int(space.n), self._identity(env))
+                counting = counting or bool(explored.counted.get("outside"))
+            try:
+                own = without_watchers(env)
+                own.reset(seed=self.seed)
+                explorer = Explorer(own, self, explored, always, counting)
+                explorer.explored.counted["outside"] = int(counting)
+                self._run(explorer, env, on_states)
+                return explorer.explored, explorer.compared
+            except ConstantChanged as error:
+                always |= frozenset({error.name})
+                self._forget()
+            except OutsideRandomness:
+                counting = True
+                self._forget()
+            except HiddenState as error:
+                raise HiddenState(f"{error} {_mend(env)}") from None
+
+    def _run(self, explorer: Explorer, env: gym.Env, on_states: OnStates) -> None:
+        written = told = time.monotonic()
+        complete = False
+        try:
+            for count, _ in enumerate(explorer.expand(), start=1):
+                now = time.monotonic()
+                if now - told > 0.1:
+                    on_states(explorer.explored.n_expanded, len(explorer.explored.keys))
+                    told = now
+                if count % GUARDED == 0:
+                    _guard(explorer)
+                if self.checkpoint is not None and now - written > self.every:
+                    _guard(explorer)
+                    self._save(explorer, env)
+                    written = time.monotonic()
+            _guard(explorer)
+            complete = True
+        except KeyboardInterrupt:
+            complete = True
+            raise
+        except Exception as error:
+            complete = type(error).__name__ == "EnumerationLimit"
+            raise
+        finally:
+            if complete and self.checkpoint is not None:
+                self._save(explorer, env)
+        on_states(explorer.explored.n_expanded, len(explorer.explored.keys))
+
+    def _save(self, explorer: Explorer, env: gym.Env) -> None:
+        if self.checkpoint is not None:
+            explorer.explored.save(Path(self.checkpoint), env.observation_space, self._identity(env))
+
+    def _forget(self) -> None:
+        if self.checkpoint is not None:
+            Path(self.checkpoint).unlink(missing_ok=True)
+
+    def _identity(self, env: gym.Env) -> dict[str, Any]:
+        """What has to be the same for a search to be continued."""
+        spec = env.spec
+        layers, layer = [], env
+        while isinstance(layer, gym.Wrapper):
+            layers.append(type(layer).__qualname__)
+            layer = layer.env
+        kind = type(env.unwrapped)
+        return {
+            "environment": f"{kind.__module__}.{kind.__qualname__}",
+            "wrappers": layers,
+            "spec": None if spec is None else json.loads(json.dumps([spec.id, spec.kwargs], default=repr)),
+            "observations": str(env.observation_space),
+            "actions": str(env.action_space),
+            "settings": [self.most_outcomes, self.runs, self.start_runs, self.seed],
+        }
+
+
+def _guard(explorer: Explorer) -> None:
+    names = explorer.trials.snapshots.changed_constants()
+    if names:
+        raise ConstantChanged(names[0])
+
+
+def _mend(env: gym.Env) -> str:
+    known = known_hidden(env)
+    how = "Reveal(env)" if known else 'Reveal(env, {"name": number of values})'
+    shown = f" ({', '.join(known)})" if known else ""
+    return (
+        f"Show what is hidden{shown} in the observation, with `irl_gym.reveal.{how}`; where it is a reward that depends on "
+        "time, replace the reward; or count what happens on average, with `by=Interaction()`."
+    )
+
+
+def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int, runs: int) -> Tabulation:
+    """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
+    space = env.observation_space
+    only_ends = [key for key in explored.ends if key not in explored.ids]
+    numbers = checked_members(space, numbers_of_keys(space, [*explored.keys, *only_ends]))
+    order = in_order(numbers)
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    end_rows = np.empty(len(explored.ends), dtype=np.int64)
+    position = {key: len(explored.keys) + i for i, key in enumerate(only_ends)}
+    both = [key for key in explored.ends if key in explored.ids]
+    both.sort(key=lambda key: place[explored.ids[key]])
+    copies = {int(place[explored.ids[key]]): len(order) + i for i, key in enumerate(both)}
+    for key, number in explored.ends.items():
+        end_rows[number] = copies[int(place[explored.ids[key]])] if key in explored.ids else place[position[key]]
+    rows, successors = np.array(explored.rows), np.array(explored.successors)
+    A = explored.n_actions
+    towards = np.where(successors < 0, 0, place[np.maximum(successors, 0)])
+    if end_rows.size:
+        towards = np.where(successors < 0, end_rows[np.maximum(-1 - successors, 0)], towards)
+    lines = Lines(place[rows // A] * A + rows % A, towards, np.array(explored.probabilities), np.array(explored.rewards))
+    states = ListedStates(space, numbers[order], copies)
+    d0 = np.zeros(states.n_states)
+    for number, probability in explored.starts.items():
+        d0[place[number]] += probability
+    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, compared, len(copies), runs))
+
+
+def _evidence(explored: Explored, compared: int, split: int, runs: int) -> Evidence:
+    counted = explored.counted["rows"]
+    method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
+    if not counted:
+        method += f", with every outcome of its draws; {compared:,} states were met in other inner states and did the same."
+        return Evidence(method, exact=True, merged=0, split=split, check=None)
+    mean_runs = explored.counted["runs"] / counted
+    # Hoeffding's inequality, for all counted probabilities at once.
+    error = math.sqrt(math.log(2 * explored.counted["lines"] / 0.05) / (2 * min(runs, mean_runs)))
+    method += (
+        f"; {counted:,} steps or resets whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
+        f"probabilities within {error:.3f}, all at once, with 95 % confidence."
+    )
+    return Evidence(method, exact=False, merged=0, split=split, check=None, error=error)

@@ -1,0 +1,166 @@
+"""Steps and resets of an environment from a given inner state, in every outcome of their draws.
+
+Draws are enumerated where they can be, and probabilities are exact; else the call is run many times, each with a seed of its
+own, and counted. Both are the same again whenever they are made again, by their *script*.
+"""
+
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym.copies.snapshots import ConstantChanged, Snapshots
+from irl_gym.enumeration.draws import Draws
+from irl_gym.enumeration.explored import Script
+from irl_gym.enumeration.limits import Limits
+from irl_gym.errors import IrlGymError, NotEnumerable, NotTabular
+
+REPLAYED = 50
+"""Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
+MOST_REFUSALS = 5
+"""Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
+ROUNDING = 1e-12
+
+Result = tuple[Any, float, bool]
+"""Observation, reward, terminated."""
+Call = Callable[[], Result]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One outcome of a call, and what was made of it while the environment was in it."""
+
+    probability: float
+    script: Script
+    result: Result
+    made: Any
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """All outcomes of a call."""
+
+    all: list[Outcome]
+    runs: int
+    """Runs that were counted; 0 where the outcomes were enumerated, or all runs did the same."""
+
+
+class OutsideRandomness(Exception):
+    """Internal: the same draws gave another outcome, so something else is random."""
+
+
+class Trials:
+    """Calls of one environment.
+
+    Args:
+        env: the caller's own copy, reset once.
+        limits: outcomes and runs.
+        always: names of attributes that belong to the inner state however large they are.
+        counting: count every random call, since draws do not tell all.
+    """
+
+    def __init__(self, env: gym.Env, limits: Limits, always: frozenset[str], counting: bool):
+        space: Any = env.action_space
+        self.env, self.limits, self.counting = env, limits, counting
+        self.first_action = int(space.start)
+        self.draws = Draws(limits.most_outcomes)
+        self.snapshots = Snapshots(env, self.draws.twin)
+        self.snapshots.include(always)
+        self.fresh = self.snapshots.take()
+        self._refusals, self._calls = 0, 0
+
+    def reset(self) -> Call:
+        """A reset, as a call."""
+
+        def run() -> Result:
+            self.snapshots.restore(self.fresh)
+            return self.env.reset()[0], 0.0, False
+
+        return run
+
+    def step(self, state: Any, action: int) -> Call:
+        """A step from an inner state, as a call; actions count from 0."""
+
+        def run() -> Result:
+            self.snapshots.restore(state)
+            observation, reward, terminated, _, _ = self.env.step(action + self.first_action)
+            return observation, float(reward), bool(terminated)
+
+        return run
+
+    def outcomes(self, call: Call, row: int, make: Callable[[Result], Any], *, runs: int) -> Outcomes:
+        """Every outcome of a call; `make` is called while the environment is in it.
+
+        Raises:
+            OutsideRandomness: the same draws did not give the same.
+            NotTabular: the environment raised an error.
+        """
+        self._calls += 1
+        if not self.counting:
+            try:
+                found = self._enumerated(call, make)
+                if found is not None:
+                    if self._calls <= 2 * REPLAYED or self._calls % REPLAYED == 0:
+                        self._check(found[-1], call)
+                    return Outcomes(found, 0)
+            except NotEnumerable:
+                self._refusals += 1
+        found = []
+        for i in range(runs):
+            result = self.again(call, row, (-1, i))
+            found.append(Outcome(1 / runs, (-1, i), result, make(result)))
+        return Outcomes(found, runs)
+
+    def again(self, call: Call, row: int, script: Script) -> Result:
+        """The outcome of a script."""
+        if script[:1] != (-1,):
+            return self._called(lambda: self.draws.replay(script, call))
+        seed = [self.limits.seed, row + 1, script[1]]
+        if not self.counting:
+            return self._called(lambda: self.draws.seeded(seed, call))
+        with _seeded_globals(seed):
+            return self._called(lambda: self.draws.seeded(seed, call))
+
+    def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
+        """All outcomes; None for a random call after others had too many."""
+        found, outcomes = [], self.draws.outcomes(call)
+        while (one := self._called(lambda: next(outcomes, None))) is not None:
+            probability, script, result = one
+            found.append(Outcome(probability, script, result, make(result)))
+            if self._refusals >= MOST_REFUSALS and probability < 1:
+                return None
+        return found
+
+    def _called(self, run: Callable[[], Any]) -> Any:
+        try:
+            return run()
+        except (IrlGymError, ConstantChanged):
+            raise
+        except Exception as error:
+            raise NotTabular(
+                f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, "
+                "to work. Mend the environment."
+            ) from error
+
+    def _check(self, last: Outcome, call: Call) -> None:
+        (observation, reward, terminated), (before, paid, ended) = self.again(call, 0, last.script), last.result
+        if str(observation) != str(before) or terminated != ended or abs(reward - paid) > ROUNDING:
+            raise OutsideRandomness
+
+
+@contextmanager
+def _seeded_globals(seed: list[int]) -> Iterator[None]:
+    """Seed the generators that NumPy and Python share, for a while: some environments draw from them."""
+    number = int(np.random.SeedSequence(seed).generate_state(1)[0])
+    legacy, plain = np.random.get_state(), random.getstate()  # noqa: NPY002 (theirs, not ours)
+    np.random.seed(number)  # noqa: NPY002
+    random.seed(number)
+    try:
+        yield
+    finally:
+        np.random.set_state(legacy)  # noqa: NPY002
+        random.setstate(plain)

@@ -1,0 +1,126 @@
+"""Demonstrations from NumPy arrays and lists: an array an episode, one long array, or padded ones.
+
+Axes: N episodes, T steps, n rows of all episodes one after the other.
+"""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.imports.cutting import counts_of, cut, depth, from_lists, from_padded
+from irl_gym.imports.expected import expect
+from irl_gym.imports.members import as_array, is_list, numbers
+from irl_gym.imports.rows import Last
+
+
+def from_arrays(
+    observations: Any,
+    actions: Any,
+    *,
+    rewards: Any = None,
+    terminated: Any = None,
+    truncated: Any = None,
+    next_observations: Any = None,
+    ends: Any = None,
+    lengths: Any = None,
+    episode: Any = None,
+    last: Last = "drop",
+    space: spaces.Space | None = None,
+    n_actions: int | None = None,
+    action_space: spaces.Space | None = None,
+    env: gym.Env | None = None,
+) -> list[Episode]:
+    """Episodes from arrays in one of three layouts; every row is checked before any episode is made.
+
+    *An array an episode*, of any lengths: `actions[i]` is (T_i,) and `observations[i]` holds T_i + 1 or T_i of them.
+
+        from_arrays([[0, 4, 8], [0, 1]], [[1, 1], [2]], terminated=[True, False], env=env)
+
+    *One long array*: `actions` is (n,), `observations` holds n or n + N, and one of `ends` ((n,) booleans, true in the last
+    step of an episode), `lengths` ((N,) steps) or `episode` ((n,) ids, equal within an episode) says where to cut. Without
+    these, `terminated` and `truncated` ((n,) booleans) say it.
+
+        from_arrays(observations, actions, ends=terminated | truncated, terminated=terminated, env=env)
+
+    *Padded*: `actions` is (N, T) and `observations` (N, T + 1, ...) or (N, T, ...); `lengths` says how many steps count, and
+    what is beyond is not read.
+
+    Args:
+        observations: members of the space; for a Tuple or Dict space lists of them, or a tuple or dictionary of arrays.
+        actions: whole numbers.
+        rewards: laid out like `actions`; 0.0 where they are not known, which no learner reads.
+        terminated: did the environment end it? One boolean, (N,) booleans, or laid out like `actions`.
+        truncated: did a time limit? An episode that is neither counts as truncated: its log stops.
+        next_observations: laid out like `actions`; what each step led to.
+        ends: true in the last step of each episode.
+        lengths: steps of each episode.
+        episode: id of each row's episode.
+        last: what to do where the last observation is missing: "drop" the last action, "repeat" the last observation, or
+            "row", the last row is an observation only; see `irl_gym.imports.rows`. Not read where it is there.
+        space: of the observations.
+        n_actions: A; the actions count from 0.
+        action_space: Discrete; the actions count from its start.
+        env: has both spaces.
+
+    Raises:
+        InvalidDemonstrations: rows that cannot be right; the first is named, counted from 0.
+        InvalidParameter: spaces that are missing, or two ways to cut.
+        NotDiscrete: continuous actions.
+    """
+    expected = expect(space, n_actions, action_space, env)
+    cuts = {"ends": ends, "lengths": lengths, "episode": episode}
+    named = [key for key, value in cuts.items() if value is not None]
+    if len(named) > 1:
+        raise InvalidParameter(f"{named[0]} and {named[1]} are both given: expected one of them. Leave the other out.")
+    columns = {"rewards": rewards, "terminated": terminated, "truncated": truncated, "next_observations": next_observations}
+    if not is_list(actions):
+        raise InvalidDemonstrations(f"the actions are {type(actions).__name__}: expected an array, or a list of arrays.")
+    if len(actions) == 0:
+        raise InvalidDemonstrations("there are no rows: expected at least one step.")
+    if isinstance(actions, np.ndarray) and actions.ndim == 2 and ends is None and episode is None:
+        counts = np.full(len(actions), actions.shape[1]) if lengths is None else counts_of(lengths)
+        if len(counts) == len(actions):
+            return from_padded(expected, observations, actions, columns, counts, last)
+    if not named and depth(actions) > 1:
+        return from_lists(expected, observations, actions, columns, last)
+    n = len(actions)
+    offsets = _offsets(n, ends, lengths, episode, terminated, truncated)
+    return cut(expected, observations, actions, columns, offsets, last, lambda row: f"row {row} (from 0)")
+
+
+def _offsets(n: int, ends: Any, lengths: Any, episode: Any, terminated: Any, truncated: Any) -> np.ndarray:
+    """(N + 1,) where the episodes of n rows start, and n."""
+    if lengths is not None:
+        offsets = np.concatenate([[0], np.cumsum(counts_of(lengths))])
+        if offsets[-1] != n:
+            raise InvalidDemonstrations(f"the lengths add up to {offsets[-1]}: expected {n}, the number of actions.")
+        return offsets
+    if episode is not None:
+        ids = as_array(episode, "episode ids")
+        if ids.shape != (n,):
+            raise InvalidDemonstrations(f"the episode ids have shape {ids.shape}: expected ({n},), one an action.")
+        starts = np.flatnonzero(np.append(True, ids[1:] != ids[:-1]))
+        seen = set()
+        for row in starts.tolist():
+            one = ids[row : row + 1].tolist()[0]
+            if one in seen:
+                raise InvalidDemonstrations(
+                    f"row {row} (from 0) goes back to episode {one!r}: expected its rows one after the other. Sort them."
+                )
+            seen.add(one)
+        return np.append(starts, n)
+    given = [one for one in (ends, terminated, truncated) if one is not None]
+    given = given if ends is None else [ends]
+    flags = [numbers(one, "end", lambda row: f"row {row} (from 0)") for one in given]
+    if not flags or any(one.shape != (n,) for one in flags):
+        shapes = " and ".join(str(one.shape) for one in flags) or "not given"
+        raise InvalidDemonstrations(
+            f"the ends of the episodes are {shapes} for {n} actions in one array: expected ends, lengths or episode. Write "
+            "[actions] and [observations] if it is one episode."
+        )
+    marks = np.flatnonzero(np.any(flags, axis=0)) + 1
+    return np.unique(np.concatenate([[0], marks, [n]])).astype(np.int64)

@@ -1,0 +1,130 @@
+"""Demonstrations from Stable-Baselines3's buffers, which keep (n_steps, n_envs) arrays. Axes: T steps, E copies.
+
+A replay buffer has next observations, so its episodes are whole. A rollout buffer has none, and does not tell termination from
+truncation: its last observations are missing, as in most logs. The copies are read one after the other, and the last episode of
+each is unfinished and counts as truncated. No attribute is imported from Stable-Baselines3: anything laid out so is read.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations
+from irl_gym.features import take
+from irl_gym.imports.expected import expect
+from irl_gym.imports.members import Name
+from irl_gym.imports.rows import Last, Rows, check_last
+
+
+def from_rollouts(
+    buffer: Any,
+    *,
+    last: Last = "drop",
+    space: spaces.Space | None = None,
+    n_actions: int | None = None,
+    action_space: spaces.Space | None = None,
+    env: gym.Env | None = None,
+) -> list[Episode]:
+    """Episodes from a `RolloutBuffer` or a `ReplayBuffer`, with dictionaries as observations or without.
+
+    From a rollout buffer, episodes are cut where `episode_starts` is true, and the first may be the end of an earlier one. Its
+    rewards are as the algorithm has them: at a time limit PPO and A2C add the value of what would have followed. A replay
+    buffer made with `optimize_memory_usage` lacks last observations, too. Where they are lacking and the last action is
+    dropped, an episode of one step is left out: none of it would remain.
+
+        from_rollouts(model.rollout_buffer, env=env)
+
+    Args:
+        buffer: of the algorithm, after some steps.
+        last: what to do where there are no next observations: "drop" the last action or "repeat" the last observation of each
+            episode; see `irl_gym.imports.rows`.
+        space: of the observations; the buffer's if None.
+        n_actions: A; the actions count from 0.
+        action_space: Discrete; the actions count from its start. The buffer's if neither is given.
+        env: has both spaces.
+
+    Raises:
+        InvalidDemonstrations: no buffer, an empty one, or rows that cannot be right; the first is named by copy and step.
+        NotDiscrete: continuous actions.
+    """
+    check_last(last)
+    replay, rollout = hasattr(buffer, "dones"), hasattr(buffer, "episode_starts")
+    if not (replay or rollout) or not hasattr(buffer, "observations"):
+        raise InvalidDemonstrations(
+            f"the buffer is {type(buffer).__name__}: expected a RolloutBuffer or a ReplayBuffer of Stable-Baselines3."
+        )
+    if env is None:
+        space = getattr(buffer, "observation_space", None) if space is None else space
+        if action_space is None and n_actions is None:
+            action_space = getattr(buffer, "action_space", None)
+    expected = expect(space, n_actions, action_space, env)
+    order = _order(buffer)
+    if not len(order):
+        raise InvalidDemonstrations("there are no rows: the buffer is empty. Let the algorithm collect some steps first.")
+    copies = np.asarray(buffer.rewards).shape[1]
+
+    def column(raw: Any) -> Any:
+        return _by_copy(raw, order, copies, int(buffer.buffer_size))
+
+    if replay:
+        done = column(buffer.dones) != 0
+        timeouts = column(getattr(buffer, "timeouts", np.zeros_like(buffer.dones))) != 0
+        flags = {"terminated": done & ~timeouts, "truncated": done & timeouts}
+        starts = np.append(True, done[:-1])
+    else:
+        starts, flags = column(buffer.episode_starts) != 0, {}
+    starts[:: len(order)] = True
+    following = getattr(buffer, "next_observations", None)
+    rows = _worth_reading(starts, keep_single=following is not None or last == "repeat")
+    offsets = np.append(np.flatnonzero(starts[rows]), len(rows))
+
+    def read(raw: Any) -> Any:
+        return take(column(raw), rows)
+
+    return Rows(
+        expected, read(buffer.observations), read(buffer.actions), offsets, _name(rows, len(order)),
+        rewards=read(buffer.rewards), next_observations=None if following is None else read(following), last=last,
+        **{key: flag[rows] for key, flag in flags.items()},
+    ).episodes()  # fmt: skip
+
+
+def _worth_reading(starts: np.ndarray, keep_single: bool) -> np.ndarray:
+    """Rows of episodes that have a step left."""
+    lengths = np.diff(np.append(np.flatnonzero(starts), len(starts)))
+    rows = np.flatnonzero(np.repeat((lengths > 1) | keep_single, lengths))
+    if not rows.size:
+        raise InvalidDemonstrations(
+            "every episode in the buffer has one step, and what it led to is not there: expected two. Pass last='repeat'."
+        )
+    return rows
+
+
+def _order(buffer: Any) -> np.ndarray:
+    """(T,) the steps that are filled, the oldest first: a full replay buffer is a ring."""
+    size, at = int(buffer.buffer_size), int(buffer.pos)
+    if not getattr(buffer, "full", False):
+        return np.arange(at)
+    order = (np.arange(size) + at) % size
+    return order[1:] if getattr(buffer, "optimize_memory_usage", False) else order  # the newest step has overwritten the oldest
+
+
+def _by_copy(raw: Any, order: np.ndarray, copies: int, size: int) -> Any:
+    """Copy after copy, each in the order of time: (E * T, ...)."""
+    if isinstance(raw, Mapping):
+        return {key: _by_copy(part, order, copies, size) for key, part in raw.items()}
+    array = np.asarray(raw)
+    if array.shape[:2] == (size, copies):
+        array = array.swapaxes(0, 1)
+    elif array.shape[:1] == (size * copies,):  # `RolloutBuffer.get` has flattened it, copy after copy
+        array = array.reshape(copies, size, *array.shape[1:])
+    else:
+        raise InvalidDemonstrations(f"the buffer holds an array of shape {array.shape}: expected ({size}, {copies}, ...).")
+    return array[:, order].reshape(copies * len(order), *array.shape[2:])
+
+
+def _name(rows: np.ndarray, steps: int) -> Name:
+    return lambda row: f"copy {rows[row] // steps}, step {rows[row] % steps} (from 0)"

@@ -1,0 +1,128 @@
+"""Demonstrations from a stream of (observation, action) pairs: a robot's log as it is read, a person's moves as they are made.
+
+One episode is in memory at a time, so the stream may be longer than memory; it is checked as it goes, and `write_minari` leaves
+nothing behind when a pair is refused.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.imports.expected import Expected, expect
+from irl_gym.imports.rows import Last, Rows, check_last
+
+FIELDS = ("observation", "action", "reward", "episode", "terminated", "truncated")
+
+
+def from_pairs(
+    pairs: Iterable[Any],
+    *,
+    fields: Sequence[str] | None = None,
+    last: Last = "drop",
+    space: spaces.Space | None = None,
+    n_actions: int | None = None,
+    action_space: spaces.Space | None = None,
+    env: gym.Env | None = None,
+) -> Iterator[Episode]:
+    """Episodes from pairs, one at a time.
+
+    An episode ends at `None`, at a pair whose action is None (its observation is the last one), where the `episode` field
+    changes, after a pair that is `terminated` or `truncated`, and with the stream.
+
+        from_pairs([(0, 1), (4, 1), (8, None), (0, 2), (1, 1), None], env=env)
+        from_pairs(log, fields=("episode", "observation", "action", "terminated"), env=env)
+
+    Args:
+        pairs: tuples of (observation, action) or (observation, action, reward), or of `fields`.
+        fields: what the tuples hold, in order, out of observation, action, reward, episode, terminated, truncated.
+        last: what to do where an episode ends without its last observation: "drop" the last action, "repeat" the last
+            observation, or "row", the last pair's action means nothing; see `irl_gym.imports.rows`.
+        space: of the observations.
+        n_actions: A; the actions count from 0.
+        action_space: Discrete; the actions count from its start.
+        env: has both spaces.
+
+    Raises:
+        InvalidDemonstrations: a pair that cannot be right, named by its number, counted from 0; or no pair.
+        InvalidParameter: spaces that are missing, or unknown fields.
+        NotDiscrete: continuous actions.
+    """
+    check_last(last)
+    if fields is not None and not (isinstance(fields, Sequence) and all(isinstance(one, str) for one in fields)):
+        raise InvalidParameter(f"fields are {fields!r}: expected a tuple of names out of {FIELDS}.")
+    if not isinstance(pairs, Iterable):
+        raise InvalidDemonstrations(f"the pairs are {type(pairs).__name__}: expected something to iterate over.")
+    if fields is not None and (set(fields) - set(FIELDS) or len(set(fields)) < len(fields) or set(FIELDS[:2]) - set(fields)):
+        raise InvalidParameter(f"fields are {tuple(fields)}: expected observation, action and others of {FIELDS}, once each.")
+    return _episodes(pairs, None if fields is None else tuple(fields), last, expect(space, n_actions, action_space, env))
+
+
+def _episodes(pairs: Iterable[Any], fields: tuple[str, ...] | None, last: Last, expected: Expected) -> Iterator[Episode]:
+    steps: list[dict[str, Any]] = []
+    number, first, closed = -1, 0, False
+    for number, pair in enumerate(pairs):
+        if pair is None:
+            if steps:
+                yield _episode(steps, first, last, expected)
+            steps, closed = [], False
+            continue
+        step = _step(pair, fields, number)
+        final = step["action"] is None
+        follows = bool(steps) and step.get("episode") == steps[-1].get("episode")
+        if steps and (not follows or (closed and not final and "episode" not in step)):
+            yield _episode(steps, first, last, expected)
+            steps = []
+        first = first if steps else number
+        steps.append(step)
+        closed = bool(step.get("terminated") or step.get("truncated"))
+        if final:
+            yield _episode(steps, first, "row", expected)
+            steps, closed = [], False
+    if steps:
+        yield _episode(steps, first, last, expected)
+    if number < 0:
+        raise InvalidDemonstrations("there are no pairs: expected at least one.")
+
+
+def _step(pair: Any, fields: tuple[str, ...] | None, number: int) -> dict[str, Any]:
+    names = fields if fields is not None else FIELDS[:3]
+    known = isinstance(pair, tuple | list) and (len(pair) == len(names) or (fields is None and len(pair) == 2))
+    if not known:
+        also = " or (observation, action)" if fields is None else ""
+        raise InvalidDemonstrations(f"pair {number} (from 0) is {pair!r}: expected ({', '.join(names)}){also}.")
+    return dict(zip(names, pair, strict=False))
+
+
+def _episode(steps: list[dict[str, Any]], first: int, last: Last, expected: Expected) -> Episode:
+    def column(key: str, filler: Any = None) -> list[Any] | None:
+        values = [step.get(key) for step in steps]
+        if all(value is None for value in values):
+            return None
+        if last == "row" and values[-1] is None:
+            values[-1] = filler
+        return values
+
+    def name(row: int) -> str:
+        return f"pair {first + row} (from 0)"
+
+    for key in ("reward", "terminated", "truncated"):
+        values = column(key, 0)
+        missing = [row for row, value in enumerate(values or []) if value is None]
+        if missing:
+            raise InvalidDemonstrations(
+                f"{name(missing[0])} has no {key}: expected one in every pair of an episode, or in none."
+            )
+    observations = [step["observation"] for step in steps]
+    actions = (
+        np.array([step["action"] for step in steps], dtype=object) if last == "row" else [step["action"] for step in steps]
+    )
+    (episode,) = Rows(
+        expected, observations, actions, np.array([0, len(steps)]), name, rewards=column("reward", 0),
+        terminated=column("terminated", False), truncated=column("truncated", False), last=last,
+    ).episodes()  # fmt: skip
+    return episode

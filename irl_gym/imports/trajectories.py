@@ -1,0 +1,174 @@
+"""Demonstrations of the package `imitation`, and of the D4RL collection, in the layouts that they keep them in."""
+
+import os
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.demonstrations import Episode
+from irl_gym.errors import DatasetMissing, InvalidDemonstrations
+from irl_gym.imports.arrays import from_arrays
+from irl_gym.imports.cutting import from_lists
+from irl_gym.imports.expected import expect
+from irl_gym.imports.members import as_array, is_list
+from irl_gym.imports.rows import Last
+
+
+def from_imitation(
+    trajectories: Iterable[Any],
+    *,
+    space: spaces.Space | None = None,
+    n_actions: int | None = None,
+    action_space: spaces.Space | None = None,
+    env: gym.Env | None = None,
+) -> list[Episode]:
+    """Episodes from trajectories of `imitation`, or from anything laid out like them.
+
+    Each is an object or a dictionary with `obs` (T + 1 observations), `acts` (T,), and where known `rews` (T,), `terminal` (one
+    boolean) and `infos` (T dictionaries). There `terminal` is also true when a time limit ended the episode; then the last of
+    `infos` says `TimeLimit.truncated`, and the episode counts as truncated. Without `terminal` it counts as truncated, too.
+
+        from_imitation([{"obs": [0, 4, 8], "acts": [1, 1], "terminal": True}], env=env)
+
+    Args:
+        trajectories: at least one.
+        space: of the observations.
+        n_actions: A; the actions count from 0.
+        action_space: Discrete; the actions count from its start.
+        env: has both spaces.
+
+    Raises:
+        InvalidDemonstrations: rows that cannot be right; the first is named by trajectory and step, counted from 0.
+        InvalidParameter: spaces that are missing.
+        NotDiscrete: continuous actions.
+    """
+    expected = expect(space, n_actions, action_space, env)
+    every = [trajectories] if hasattr(trajectories, "acts") or isinstance(trajectories, Mapping) else trajectories
+    if not isinstance(every, Iterable):
+        raise InvalidDemonstrations(f"the trajectories are {type(every).__name__}: expected a list of them.")
+    every = list(every)
+    if not every:
+        raise InvalidDemonstrations("there are no trajectories: expected at least one.")
+    fields = [{key: _field(one, key, i) for key in ("obs", "acts", "rews", "terminal", "infos")} for i, one in enumerate(every)]
+    rewards = [one["rews"] for one in fields]
+    unpaid = [i for i, one in enumerate(rewards) if one is None]
+    if 0 < len(unpaid) < len(rewards):
+        raise InvalidDemonstrations(
+            f"trajectory {unpaid[0]} (from 0) has no rews, but others have: expected them in all or in none. Drop the rewards."
+        )
+    stopped = np.array([_timed_out(one["infos"]) for one in fields])
+    ended = np.array([_flag(one["terminal"], i) for i, one in enumerate(fields)])
+    columns = {"rewards": None if unpaid else rewards, "terminated": ended & ~stopped, "truncated": stopped}
+    observations = [one["obs"].unwrap() if hasattr(one["obs"], "unwrap") else one["obs"] for one in fields]  # its dictionaries
+    return from_lists(expected, observations, [one["acts"] for one in fields], columns, "drop", "trajectory")
+
+
+def _field(trajectory: Any, key: str, number: int) -> Any:
+    value = trajectory.get(key) if isinstance(trajectory, Mapping) else getattr(trajectory, key, None)
+    if value is None and key in ("obs", "acts"):
+        raise InvalidDemonstrations(
+            f"trajectory {number} (from 0) is {type(trajectory).__name__} without {key!r}: expected obs and acts, as "
+            "attributes or keys."
+        )
+    return value
+
+
+def _flag(value: Any, number: int) -> bool:
+    if value is None:
+        return False
+    if as_array(value, "terminal flags").ndim or value not in (True, False):
+        raise InvalidDemonstrations(f"trajectory {number} (from 0) has terminal {value!r}: expected True or False.")
+    return bool(value)
+
+
+def _timed_out(infos: Any) -> bool:
+    final = infos[-1] if is_list(infos) and len(infos) else None
+    return isinstance(final, Mapping) and bool(final.get("TimeLimit.truncated", False))
+
+
+def from_d4rl(
+    source: Mapping[str, Any] | str | os.PathLike,
+    *,
+    last: Last = "drop",
+    space: spaces.Space | None = None,
+    n_actions: int | None = None,
+    action_space: spaces.Space | None = None,
+    env: gym.Env | None = None,
+) -> list[Episode]:
+    """Episodes from D4RL's flat arrays: `observations, actions, rewards, terminals, timeouts`, and maybe `next_observations`.
+
+    A row in which `terminals` is true ends an episode by termination, one in which `timeouts` is true by truncation, and what
+    follows the last of them is an unfinished episode. `timeouts` and `rewards` may be missing.
+
+        from_d4rl({"observations": [0, 4, 0], "actions": [1, 1, 2], "terminals": [False, True, True]}, last="repeat", env=env)
+
+    Args:
+        source: a dictionary of arrays, or the path of an HDF5 file that holds them.
+        last: what to do where there are no `next_observations`: "drop" the last action or "repeat" the last observation of each
+            episode; see `irl_gym.imports.rows`.
+        space: of the observations.
+        n_actions: A; the actions count from 0.
+        action_space: Discrete; the actions count from its start.
+        env: has both spaces.
+
+    Raises:
+        DatasetMissing: no such file.
+        InvalidDemonstrations: an array that is missing, a file that is not HDF5, rows that cannot be right.
+        InvalidParameter: spaces that are missing.
+        NotDiscrete: continuous actions.
+    """
+    expect(space, n_actions, action_space, env)  # before a large file is read
+    if not isinstance(source, Mapping | str | os.PathLike):
+        raise InvalidDemonstrations(f"the source is {type(source).__name__}: expected a dictionary of arrays, or a path.")
+    arrays = source if isinstance(source, Mapping) else _read_hdf5(Path(source))
+    for key in ("observations", "actions", "terminals"):
+        if key not in arrays:
+            close = get_close_matches(key, map(str, arrays), 1, 0.5)
+            mend = f"Rename {close[0]!r}." if close else "Is it a D4RL dataset?"
+            raise InvalidDemonstrations(f"there is no {key!r} among {sorted(map(str, arrays))}: expected D4RL's arrays. {mend}")
+    return from_arrays(
+        arrays["observations"], as_array(arrays["actions"], "actions"), rewards=arrays.get("rewards"),
+        terminated=arrays["terminals"], truncated=arrays.get("timeouts"),
+        ends=_either(arrays["terminals"], arrays.get("timeouts")), next_observations=arrays.get("next_observations"),
+        last=last, space=space, n_actions=n_actions, action_space=action_space, env=env,
+    )  # fmt: skip
+
+
+def _either(terminals: Any, timeouts: Any) -> np.ndarray:
+    ended = as_array(terminals, "terminals").reshape(-1)
+    stopped = ended if timeouts is None else as_array(timeouts, "timeouts").reshape(-1)
+    if ended.shape != stopped.shape:
+        raise InvalidDemonstrations(f"there are {len(ended)} terminals and {len(stopped)} timeouts: expected as many.")
+    return (ended != 0) | (stopped != 0)
+
+
+def _read_hdf5(path: Path) -> dict[str, Any]:
+    import h5py
+
+    if not path.is_file():
+        raise DatasetMissing(f"{path} is not a file: expected an HDF5 file with D4RL's arrays.")
+    try:
+        with h5py.File(path, "r") as file:
+            return _read_group(file)
+    except OSError as error:
+        raise InvalidDemonstrations(f"{path} cannot be read ({error}): expected an HDF5 file with D4RL's arrays.") from error
+
+
+def _read_group(group: Any) -> dict[str, Any]:
+    """Arrays by name; `observations` may be a group, of a Dict space. What is only about the collection is left where it is."""
+    read = {}
+    for key, value in group.items():
+        if key in ("observations", "next_observations") and hasattr(value, "items"):
+            read[key] = _read_arrays(value)
+        elif not hasattr(value, "items"):
+            read[key] = value[()]
+    return read
+
+
+def _read_arrays(group: Any) -> dict[str, Any]:
+    return {key: _read_arrays(value) if hasattr(value, "items") else value[()] for key, value in group.items()}

@@ -1,0 +1,90 @@
+"""Tables as files: an npz of numbers, and the evidence as json; nothing in it is ever unpickled.
+
+The observation space is not kept: who reads the file gives it, and it is compared.
+"""
+
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from gymnasium import spaces
+
+from irl_gym.errors import InvalidMDP
+from irl_gym.listed_states import ListedStates
+from irl_gym.mdp import TabularMDP
+from irl_gym.rewards import TabularReward, plain_json
+from irl_gym.selfcheck import Payments, SelfCheck
+from irl_gym.states import StateIndex
+from irl_gym.tabulation import Evidence, Tabulation
+
+
+def save_table(table: Tabulation, path: str | os.PathLike) -> None:
+    """Write a table whose states are integers (a StateIndex or ListedStates); beside first, then renamed.
+
+    Raises:
+        InvalidMDP: states of another numbering, such as the cells of a grid.
+    """
+    states, mdp, path = table.states, table.mdp, Path(path)
+    if not isinstance(states, StateIndex | ListedStates):
+        raise InvalidMDP(
+            f"the states are {type(states).__name__}: expected a StateIndex or ListedStates. Make such a table again instead."
+        )
+    evidence = {**vars(table.evidence), "check": None if table.evidence.check is None else vars(table.evidence.check)}
+    none = np.zeros(0)
+    beside = path.with_name(f".{path.name}.tmp.npz")
+    np.savez(
+        beside,
+        data=mdp.P.data, indices=mdp.P.indices, indptr=mdp.P.indptr, d0=mdp.d0, gamma=np.array(mdp.gamma),
+        reward=table.reward.values, mean=table.payments.mean, deviation=table.payments.deviation,
+        entries=none if table.payments.entries is None else table.payments.entries,
+        largest=np.array(table.payments.largest),
+        space=np.array(str(states.space)),
+        numbers=states.numbers if isinstance(states, ListedStates) else none,
+        copies=np.array(list(states.terminal_copies.items()), dtype=np.int64).reshape(-1, 2),
+        evidence=np.array(json.dumps(evidence, default=plain_json, sort_keys=True)),
+    )  # fmt: skip
+    os.replace(beside, path)
+
+
+def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
+    """What `save_table` wrote.
+
+    Args:
+        path: the file.
+        space: observation space of the environment that the table is of.
+
+    Raises:
+        FileNotFoundError: no such file.
+        InvalidMDP: a file that holds no table, or one of other observations.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist: expected a table, as `save_table` writes it.")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+        if str(found["space"]) != str(space):
+            raise InvalidMDP(f"{path} holds a table of observations {found['space']}: expected {space}. Is it another one's?")
+        return _rebuilt(found, space)
+    except (OSError, KeyError, EOFError, zipfile.BadZipFile, TypeError, ValueError) as error:
+        if isinstance(error, InvalidMDP):
+            raise
+        raise InvalidMDP(f"{path} holds no table ({error}): expected what `save_table` writes.") from error
+
+
+def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
+    shape = (found["indptr"].size - 1, found["d0"].size)
+    mdp = TabularMDP(
+        sp.csr_array((found["data"], found["indices"], found["indptr"]), shape=shape), float(found["gamma"]), found["d0"]
+    )
+    entries = found["entries"] if found["entries"].size == mdp.P.nnz else None
+    payments = Payments(found["mean"], found["deviation"], entries, float(found["largest"]))
+    copies = {int(row): int(copy) for row, copy in found["copies"]}
+    states = ListedStates(space, found["numbers"], copies) if found["numbers"].size else StateIndex(space, copies)
+    evidence = json.loads(str(found["evidence"]))
+    check = None if evidence["check"] is None else SelfCheck(**evidence["check"])
+    reward = TabularReward(found["reward"], {"source": "environment"})
+    return Tabulation(mdp, reward, payments, states, Evidence(**{**evidence, "check": check}))

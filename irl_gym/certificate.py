@@ -1,21 +1,18 @@
 """What a learned reward proves, recomputed from P, the expert and R alone; nothing is taken from the solver's word.
 
 Primal: V = (I - gamma P_pi)^-1 R (5), the margins of (4), and the objective of the LP at R.
-Dual: for *any* y >= 0 on the rows of (4), Lagrange's bound
-    D(y) = sum_s T (1 - sum_a y(s, a))+  +  R_max sum_i (|c_i| - l1)+
-is above every objective, where T bounds a margin (the cap, or 2 R_max / (1 - gamma)) and c is the gradient of
-sum y margins with respect to R. So D(y) - objective bounds what the reward falls short of the optimum, whatever the solver did.
+Dual: `dual_bound`, for any multipliers of (4). Where the expert is known in part, or errs, see `learners.soft_certificate`.
 Axes: S states, A actions, n rows of (4).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from irl_gym._typing import Indices, Vector
+from irl_gym._typing import Indices, Numbers, Vector
 from irl_gym.comparisons import Comparisons, compare
+from irl_gym.dual_bound import DualBound
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward, as_reward
@@ -59,6 +56,18 @@ class Certificate:
     """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
     marginless: Indices
     """Reachable states with rows but without a positive margin under R."""
+    slack: float | None = None
+    """C, the price of a violation of (4); None where rows are hard."""
+    unknown: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Reachable states, not terminal, in which nothing is known of the expert: no rows, not judged."""
+    violated: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """States with a violated row of (4)."""
+    violated_rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    """(v, 2) state and action of each violated row: the action is worth more than the expert's under R."""
+    violations: Numbers = field(default_factory=lambda: np.zeros(0))
+    """(v,) by how much each is violated, in units of value."""
+    violated_visits: Numbers = field(default_factory=lambda: np.zeros(0))
+    """(v,) how often the row's state was visited; NaN when that is not known."""
 
     @property
     def duality_gap(self) -> float:
@@ -91,6 +100,11 @@ class Certificate:
             )
         if self.marginless.size:
             lines.append(f"no margin                in {self.marginless.size} states, where ties remain")
+        if self.violated.size:
+            count, states, most = self.violations.size, self.violated.size, self.violations.max()
+            lines.append(f"violated                 {count} rows of (4), in {states} states, by at most {most:.2e}")
+        if self.unknown.size:
+            lines.append(f"unknown                  nothing is known of the expert in {self.unknown.size} reachable states")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
@@ -181,7 +195,7 @@ def certify(
     values = row_margins(part, comparisons, R, discounted)
     usable = _comparable(comparisons, R)
     least = least_per_state(values[usable], comparisons.states[usable], part.n_states)
-    rounding = OPTIMAL_WITHIN * float(np.abs(R.values).max()) * (1 + 0.1 / (1 - mdp.gamma))
+    rounding = tolerated(R, mdp.gamma)
     if y is not None:  # a trivial row bounds no margin, so its dual may not tighten D(y)
         y = np.where(usable | comparisons.equal, y, 0.0)
     violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))
@@ -189,7 +203,7 @@ def certify(
     objective_states = _objective_states(comparisons, usable, margin_cap, counted, rows)
     margins = least[objective_states]
     total = float(np.minimum(margins, np.inf if margin_cap is None else margin_cap).sum())
-    dual = _Dual(part, comparisons, discounted, R.on_states, objective_states, r_max, l1, margin_cap)
+    dual = DualBound(part, comparisons, discounted, R.on_states, objective_states, r_max, l1, margin_cap)
     norm = float(np.abs(R.values).sum())
     paid = R.values if R.on_states else R.values[~part.terminal]
     tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
@@ -211,7 +225,27 @@ def certify(
         unconstrained=rows[np.isnan(least) & ~part.terminal],
         inseparable=rows[np.unique(tied)],
         marginless=rows[least <= rounding],
+        **violated_rows(violations, rounding, comparisons, rows, None),
     )
+
+
+def tolerated(R: TabularReward, gamma: float) -> float:
+    """The violation of (4) that is none: what solvers' feasibility leaves."""
+    return OPTIMAL_WITHIN * float(np.abs(R.values).max()) * (1 + 0.1 / (1 - gamma))
+
+
+def violated_rows(
+    violations: np.ndarray, rounding: float, comparisons: Comparisons, rows: np.ndarray, visits: np.ndarray | None
+) -> dict[str, Any]:
+    """The fields of a certificate that list the violated rows, given (n,) violations and the states (r,) they are of."""
+    which = np.flatnonzero(violations > rounding)
+    states = rows[comparisons.states[which]].astype(np.int64)
+    return {
+        "violated": np.unique(states),
+        "violated_rows": np.stack([states, comparisons.actions[which].astype(np.int64)], axis=1),
+        "violations": violations[which],
+        "violated_visits": np.full(which.size, np.nan) if visits is None else visits[states].astype(np.float64),
+    }
 
 
 def _objective_states(
@@ -224,58 +258,3 @@ def _objective_states(
     if counted is not None:
         states = np.intersect1d(states, np.flatnonzero(np.isin(rows, counted)))
     return states
-
-
-@dataclass(frozen=True, eq=False)
-class _Dual:
-    """Lagrange's bound for one program."""
-
-    mdp: TabularMDP
-    comparisons: Comparisons
-    discounted: Discounted
-    on_states: bool
-    objective_states: np.ndarray
-    r_max: float
-    l1: float
-    cap: float | None
-
-    def bound(self, y: np.ndarray | None) -> float:
-        """The least D(y)."""
-        return float("nan") if y is None else min(map(self.at, self._signed(y)))
-
-    def _signed(self, y: np.ndarray) -> list[np.ndarray]:
-        """Y >= 0 on the inequalities, with either sign on the equalities, whose sign solvers leave open."""
-        equal, positive = self.comparisons.equal, np.maximum(y, 0.0)
-        return [np.where(equal, sign * y, positive) for sign in ((1.0, -1.0) if equal.any() else (1.0,))]
-
-    def at(self, y: np.ndarray) -> float:
-        """D(y), for y >= 0 on the inequalities."""
-        mdp, comparisons = self.mdp, self.comparisons
-        most = 2 * self.r_max / (1 - mdp.gamma) if self.cap is None else self.cap
-        weights = np.where(comparisons.equal, 0.0, y)
-        per_state = np.bincount(comparisons.states, weights=weights, minlength=mdp.n_states)
-        slack = most * float(np.maximum(1 - per_state[self.objective_states], 0.0).sum())
-        return slack + self.r_max * float(np.maximum(np.abs(self.gradient(y)) - self.l1, 0.0).sum())
-
-    def least_l1_norm(self, y: np.ndarray | None) -> float:
-        """Lagrange's bound below every ||R||_1 with all margins at the cap: cap sum(y) - R_max sum_i (|c_i| - 1)+."""
-        if y is None or self.cap is None:
-            return float("nan")
-        counted = np.isin(self.comparisons.states, self.objective_states) & ~self.comparisons.equal
-        bounds = []
-        for signed in self._signed(y):
-            beyond = np.maximum(np.abs(self.gradient(signed)) - 1, 0.0).sum()
-            bounds.append(self.cap * float(signed[counted].sum()) - self.r_max * float(beyond))
-        return max(bounds)
-
-    def gradient(self, y: np.ndarray) -> np.ndarray:
-        """c, the gradient of sum y margins with respect to R: (S,) or (S*A,), by one transposed solve."""
-        mdp, comparisons = self.mdp, self.comparisons
-        if self.on_states:
-            return self.discounted.solve_transposed(comparisons.rows.T @ y)
-        stacked = comparisons.states * mdp.n_actions + comparisons.actions
-        on_V = np.bincount(comparisons.states, weights=y, minlength=mdp.n_states)
-        on_V = on_V - mdp.gamma * (sp.csr_array(mdp.P[stacked]).T @ y)
-        u = self.discounted.solve_transposed(on_V)
-        c = mdp.mixing(comparisons.distribution).T @ u - np.bincount(stacked, weights=y, minlength=mdp.P.shape[0])
-        return np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, c)

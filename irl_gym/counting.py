@@ -12,7 +12,7 @@ Axes: S states, A actions, N episodes.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 import gymnasium as gym
@@ -20,8 +20,9 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.checks import checked_number
+from irl_gym.copies.stripped import without_watchers
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
-from irl_gym.demonstrations import Episode, _stack
+from irl_gym.demonstrations import Episode, stacked
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP, check_discount
@@ -148,6 +149,47 @@ class Counting:
         return entries.joined(rows, following, share, pays, pays**2)
 
 
+@dataclass(frozen=True)
+class Interaction:
+    """A table from random steps of a copy of the environment: for `tabulate(env, gamma=..., by=Interaction())`.
+
+    Raises:
+        InvalidParameter: fewer than 1 steps, or a negative seed.
+    """
+
+    steps: int = 100_000
+    """Steps in all."""
+    counting: Counting = field(default_factory=Counting)
+    """What counts become."""
+    seed: int = 0
+    """Of resets and actions."""
+
+    def __post_init__(self) -> None:
+        checked_number("steps", self.steps, "a number of steps of at least 1", least=1, whole=True)
+        checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
+
+    def table(self, env: gym.Env, gamma: float, progress: Callable[[int, int], None] | None = None, /) -> Tabulation:
+        """The table that the steps gave.
+
+        Raises:
+            NotDiscrete: observations or actions that are not made of integers.
+            NotTabular: the environment cannot be copied.
+        """
+        space: Any = env.action_space
+        episodes = interact(without_watchers(env), self.steps, seed=self.seed)
+        return self.counting.table(_told(episodes, self.steps, progress), env.observation_space, int(space.n), gamma=gamma)
+
+
+def _told(episodes: Iterable[Episode], steps: int, progress: Callable[[int, int], None] | None) -> Iterator[Episode]:
+    """The same episodes; `progress` is told the steps they take."""
+    taken = 0
+    for episode in episodes:
+        taken += len(episode)
+        if progress is not None:
+            progress(taken, steps)
+        yield episode
+
+
 def interact(env: gym.Env, steps: int, *, seed: int, policy: Policy | None = None) -> Iterator[Episode]:
     """Run an environment for some steps, an episode at a time, from its own resets.
 
@@ -202,5 +244,5 @@ def _episodes(env: gym.Env, steps: int, seed: int, choose: Callable[[Any], int])
             rewards.append(float(reward))
             truncated = truncated or (not terminated and len(actions) in (limit, left))
         left -= len(actions)
-        yield Episode(_stack(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), begin)
+        yield Episode(stacked(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), begin)
         begin = None

@@ -80,12 +80,13 @@ class Episode:
         return states.encode_batch(self.observations, terminated=ended)
 
 
-def _stack(observations: Sequence[Any]) -> Any:
+def stacked(observations: Sequence[Any]) -> Any:
+    """Observations as a batch, stacked as vector environments stack them."""
     first = observations[0]
     if isinstance(first, dict):
-        return {key: _stack([one[key] for one in observations]) for key in first}
+        return {key: stacked([one[key] for one in observations]) for key in first}
     if isinstance(first, tuple):
-        return tuple(_stack([one[i] for one in observations]) for i in range(len(first)))
+        return tuple(stacked([one[i] for one in observations]) for i in range(len(first)))
     return np.asarray(observations)
 
 
@@ -132,7 +133,7 @@ def _stepped(
             rewards.append(float(reward))
             truncated = truncated or (not terminated and len(actions) == max_episode_steps)
         yield Episode(
-            _stack(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), episode_seed
+            stacked(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), episode_seed
         )
 
 

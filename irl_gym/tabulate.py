@@ -64,8 +64,9 @@ def tabulate(
         env: a Gymnasium environment. A TimeLimit and wrappers that only watch are looked through; LearnedReward gives its
             reward; other wrappers belong to the environment.
         gamma: discount in (0, 1); no environment carries one.
-        by: None for what is known of the environment, and enumeration where nothing is; `Enumeration(...)` to enumerate in
-            any case, with limits of its own; `irl_gym.interaction.Interaction(...)` to count what random steps do.
+        by: how. None is `Enumeration(known=True)`: what is known of the environment, and enumeration where nothing is.
+            `irl_gym.enumeration.table.Enumeration(...)` has limits and can be continued; `irl_gym.counting.Interaction(...)`
+            counts what random steps do.
         check_steps: steps of a copy of the environment to compare with an exact table; 0 for none.
         seed: of the check.
         progress: called with two numbers as an enumeration goes on: states tried and found.
@@ -89,8 +90,9 @@ def tabulate(
             "`gymnasium.wrappers.DiscretizeAction`."
         )
     learned = _learned_reward(env)
-    found = next(filter(None, (source(env, gamma) for source in SOURCES)), None) if by is None else None
-    found = found or (by or Enumeration()).table(env, gamma, progress)
+    by = by or Enumeration(known=True)
+    known = (source(env, gamma) for source in SOURCES) if isinstance(by, Enumeration) and by.known else ()
+    found = next(filter(None, known), None) or by.table(env, gamma, progress)
     if check_steps and found.evidence.exact:
         check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
         found = replace(found, evidence=replace(found.evidence, check=check))

@@ -101,6 +101,7 @@ class Explored:
         lengths = np.array([len(script) for script in self.scripts], dtype=np.int64)
         k = len(numbers_of_keys(space, self.keys[:1])[0])
         ends = numbers_of_keys(space, list(self.ends)) if self.ends else np.zeros((0, k), dtype=np.int64)
+        path.parent.mkdir(parents=True, exist_ok=True)
         beside = path.with_name(f".{path.name}.tmp.npz")
         np.savez(
             beside,

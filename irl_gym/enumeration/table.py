@@ -48,6 +48,8 @@ class Enumeration(Limits):
     """A file (.npz) that the search is kept in, and continued from if it is there; None for none."""
     every: float = 20.0
     """Seconds between two writings of it."""
+    known: bool = False
+    """Ask first what is known of the environment, such as a published `P`; enumerate where nothing is. For `tabulate`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

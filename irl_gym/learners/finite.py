@@ -13,6 +13,13 @@ Two modes:
     in every state that can have a margin at all, so no tie is left that a reward could break; and half of it leaves an interior
     of rewards that attain it, in which the l1 term finds the simplest. With l1 = 0 the reward is the limit l1 -> 0+ of the
     capped LP: the least ||R||_1 with all margins at least tau, the optimum for every l1 below `stats["l1_limit"]`.
+An expert that is known in some states only (rows of NaN), or that errs (`slack`), has the programs of `learners.soft`: (4) has
+rows in the states where it is known, and V is what acting best is worth, so that no policy is made up where none was seen and
+no unknown state is worth more than it earns.
+`unvisited="avoid"`  (default) unknown states have the lowest reward that the margins allow, so an agent that strays into them
+    returns to what the expert was seen to do. It is a choice, not knowledge: nothing says that these states are bad.
+`slack=C`  a violation of (4) costs C, where a margin is worth 1, both in proportion to `visits`. With C large the rows are hard
+    again wherever they can hold. The certificate lists the rows that are violated.
 Axes: S states, A actions.
 """
 
@@ -22,22 +29,17 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym.certificate import Certificate, certify, least_per_state, row_margins
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, float_array
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidMDP, InvalidParameter, SolverFailed, SolverInfeasible
 from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.programs import Program, RewardOn, Solved, Solving
+from irl_gym.learners.feature_rows import completed
+from irl_gym.learners.partial import PartialTask
+from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved, Solving
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import SolverName, Status, check_solving
-
-JUST_BELOW = 1 - 1e-3
-"""`l1="auto"` is lambda_0 times this."""
-NO_MARGIN = 1e-9
-"""A margin below this, relative to R_max, is none: it is the solvers' rounding."""
-LARGEST_BOUND = 1e6
-"""A margin below R_max over this is none: such a state is left out of the uniform margin."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,10 @@ class FiniteLP:
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
     """Seconds for each program; None for no limit."""
+    slack: float | None = None
+    """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
+    unvisited: Literal["avoid", "free"] = "avoid"
+    """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
 
     def __post_init__(self) -> None:
         checked_number("r_max", self.r_max, "a bound above 0, such as 1.0", above=0)
@@ -72,22 +78,41 @@ class FiniteLP:
         check_solving(self.solver, self.time_limit)
         if self.reward_on not in ("state", "state-action"):
             raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
+        if self.unvisited not in ("avoid", "free"):
+            raise InvalidParameter(f"unvisited is {self.unvisited!r}: expected 'avoid' or 'free'.")
+        if self.slack is not None:
+            checked_number("slack", self.slack, "a price of at least 1, or None for hard rows", least=1)
+            if self.reward_on == "state-action":
+                raise InvalidParameter(
+                    f"slack is {self.slack!r}: expected None with reward_on='state-action', where every expert is optimal for "
+                    "some reward and no row needs slack."
+                )
 
-    def fit(self, mdp: TabularMDP, expert: Any) -> IRLResult[TabularReward, Certificate]:
+    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> IRLResult[TabularReward, Certificate]:
         """Learn a reward under which the expert is optimal.
 
         Args:
             mdp: only states reachable from d0 get a reward; the others get 0 and are not judged.
-            expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions.
+            expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions. Rows of NaN say that nothing is known
+                of the expert in a state, as in the tables of `irl_gym.demonstrated`: such a state has no row of (4).
+            visits: (S,) how often the expert was seen in each state: what its margin and its violation count for, and what
+                the certificate says of violated rows. Where the expert is known everywhere and slack is None they change
+                nothing.
 
         Raises:
             InvalidPolicy: an expert of the wrong shape or content.
+            InvalidParameter: visits of the wrong shape, or 0 where the expert is known.
             DegenerateExpert: (4) leaves no reward with a positive margin anywhere.
             SolverTimeout, SolverFailed: no answer.
         """
         if not isinstance(mdp, TabularMDP):
             raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
-        task, y_l1 = _Task(self, mdp, expert), None
+        known_expert, known = completed(expert, mdp.n_states)
+        acting = mdp.reachable & ~mdp.terminal
+        visits = _checked_visits(visits, known & acting)
+        if self.slack is not None or (acting & ~known).any():
+            return PartialTask(self, mdp, known_expert, known, visits).fit()
+        task, y_l1 = _Task(self, mdp, known_expert), None
         lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
         l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
         if self.margin_cap is None:
@@ -114,7 +139,27 @@ class FiniteLP:
             InvalidPolicy: an expert of the wrong shape or content.
             DegenerateExpert: no reward has a positive margin, so lambda_0 would be 0.
         """
+        expert, known = completed(expert, mdp.n_states)
+        if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
+            return PartialTask(self, mdp, expert, known, None).lambda_0()
         return _Task(self, mdp, expert).lambda_0()
+
+
+def _checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
+    """(S,) visits, above 0 in the states `needed`; None when not given."""
+    if visits is None:
+        return None
+    array = float_array("visits", visits, "(S,) numbers", InvalidParameter)
+    if array.shape != needed.shape:
+        raise InvalidParameter(f"visits has shape {array.shape}: expected ({needed.size},), one number for each state.")
+    wrong = np.flatnonzero(~(array >= 0) | ~np.isfinite(array) | (needed & (array == 0)))
+    if wrong.size:
+        s = wrong[0]
+        raise InvalidParameter(
+            f"visits[s={s}] is {array[s]:g}: expected a number of at least 0, and above it where the expert is known. Where "
+            "nothing is known, the expert's row is NaN."
+        )
+    return array
 
 
 class _Task:

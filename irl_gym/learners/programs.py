@@ -23,6 +23,12 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.solvers import Answer, SolverName, solve
 
 RewardOn = Literal["state", "state-action"]
+JUST_BELOW = 1 - 1e-3
+"""`l1="auto"` is lambda_0 times this."""
+NO_MARGIN = 1e-9
+"""A margin below this, relative to R_max, is none: it is the solvers' rounding."""
+LARGEST_BOUND = 1e6
+"""A margin below R_max over this is none: such a state is left out of the uniform margin."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,137 @@
+"""The certificate of an expert that is known in some states only, or that errs: recomputed from P, the expert and R alone.
+
+V is the value of acting best under R, everywhere in the reachable part (policy iteration, to rounding), so the margin of a row
+of (4) is what the expert's action is worth more than another in truth, whatever is done where the expert is not known:
+    margin(s, a) = Q(s, pi) - Q(s, a), of (P_pi(s) - P_a(s)) V for rewards on states
+`expert_optimal` is judged where the expert is known. The bound is weak duality's (`linear_program`), valid for any multipliers.
+Axes: S states, A actions, n rows of (4).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym._typing import Vector
+from irl_gym.certificate import Certificate, least_per_state, tolerated, violated_rows
+from irl_gym.dynamic_programming import backup, policy_iteration
+from irl_gym.learners.soft import PartlyKnown
+from irl_gym.mdp import TabularMDP
+from irl_gym.rewards import TabularReward
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """The program whose objective is recomputed."""
+
+    r_max: float
+    l1: float
+    cap: float | None
+    slack: float | None
+    counted: np.ndarray
+    """(n,) rows that count towards margins."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a reward does to each row, under the best continuation."""
+
+    margins: np.ndarray
+    """(n,)."""
+    price: float
+    """N, what l1 prices."""
+
+
+def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
+    """The rows of (4) under a reward on the reachable part."""
+    mdp, c = partly.mdp, partly.comparisons
+    steps = R.expected(mdp)
+    Q = policy_iteration(mdp, steps, tolerance=0.0).Q
+    Q = backup(mdp, steps, Q.max(axis=1))
+    mine = (c.distribution * Q).sum(axis=1)
+    margins = mine[c.states] - Q[c.states, c.actions]
+    loss = np.where(mdp.terminal, 0.0, Q.max(axis=1) - mine)
+    count = 1 if R.on_states else mdp.n_actions
+    here = R.values if R.on_states else np.where(partly.unknown, R.values[:, 0], 0.0)
+    above = here + (mdp.gamma * loss if R.on_states else _spread(partly, R))  # r_pi
+    parts = np.maximum(above, 0.0) + np.maximum(-here, 0.0)
+    price = count * float(np.where(partly.avoided, above + r_max, parts).sum())
+    if not R.on_states:
+        price += float(np.abs(R.values[partly.known]).sum())
+    return Judged(margins, price)
+
+
+def _spread(partly: PartlyKnown, R: TabularReward) -> Vector:
+    """(S,) how much r_pi is above R in unknown states, for a reward on steps: what random actions lose there."""
+    mdp = partly.mdp
+    V = policy_iteration(mdp, R.expected(mdp), tolerance=0.0).Q.max(axis=1)
+    following = (mdp.P @ V).reshape(mdp.n_states, mdp.n_actions)
+    return np.where(partly.unknown, mdp.gamma * (following.max(axis=1) - following.mean(axis=1)), 0.0)
+
+
+def objective(partly: PartlyKnown, judged: Judged, terms: Terms) -> float:
+    """sum_s w_s (min(margin+, cap) - C violation) - l1 N, at the reward."""
+    S, c = partly.mdp.n_states, partly.comparisons
+    counted = least_per_state(judged.margins[terms.counted], c.states[terms.counted], S)
+    least = least_per_state(judged.margins[partly.active], c.states[partly.active], S)
+    gains = np.clip(np.where(np.isnan(counted), 0.0, counted), 0.0, np.inf if terms.cap is None else terms.cap)
+    short = np.maximum(-np.where(np.isnan(least), 0.0, least), 0.0) * (terms.slack or 0.0)
+    return float(partly.weights @ (gains - short)) - terms.l1 * judged.price
+
+
+def certify_partly(
+    mdp: TabularMDP,
+    partly: PartlyKnown,
+    rows: np.ndarray,
+    reward: TabularReward,
+    terms: Terms,
+    *,
+    bound: float,
+    lambda_0: float | None,
+    visits: np.ndarray | None,
+) -> Certificate:
+    """Recompute what a reward proves about an expert that is known in part.
+
+    Args:
+        mdp: the whole MDP.
+        partly: its reachable part, and what is known.
+        rows: (r,) the states of the whole that are in the part.
+        reward: (S,) or (S, A), of the whole.
+        terms: of the objective.
+        bound: no reward has a larger objective.
+        lambda_0: reported as given.
+        visits: (S,) how often each state was visited; None when that is not known.
+    """
+    part, c = partly.mdp, partly.comparisons
+    R = TabularReward(reward.values[rows])
+    judged = judge(partly, R, terms.r_max)
+    comparable = ~c.equal & (~c.trivial | (not R.on_states))
+    least = least_per_state(judged.margins[comparable], c.states[comparable], part.n_states)
+    rounding = tolerated(R, mdp.gamma)
+    short = np.where(partly.active, np.maximum(-judged.margins, 0.0), 0.0)
+    worst = float(short.max(initial=0.0))
+    margin = np.full(mdp.n_states, np.nan)
+    margin[rows] = least
+    paid = R.values if R.on_states else R.values[~part.terminal]
+    tied = c.states[c.trivial & ~c.equal & R.on_states]
+    proof: dict[str, Any] = violated_rows(short, rounding, c, rows, visits)
+    return Certificate(
+        expert_optimal=bool(worst <= rounding),
+        worst_violation=worst,
+        margin=margin,
+        objective=objective(partly, judged, terms),
+        dual_bound=bound,
+        l1=float(terms.l1),
+        lambda_0=None if lambda_0 is None else float(lambda_0),
+        margin_cap=None if terms.cap is None else float(terms.cap),
+        l1_norm=float(np.abs(R.values).sum()),
+        least_l1_norm=float("nan"),
+        constant=bool(np.ptp(paid) <= 1e-9 * terms.r_max) if paid.size else True,
+        zero=bool(np.abs(paid).max(initial=0.0) <= 1e-9 * terms.r_max),
+        unconstrained=rows[np.isnan(least) & partly.known],
+        inseparable=rows[np.unique(tied)],
+        marginless=rows[least <= rounding],
+        slack=None if terms.slack is None else float(terms.slack),
+        unknown=rows[partly.unknown],
+        **proof,
+    )

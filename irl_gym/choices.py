@@ -10,16 +10,21 @@ from gymnasium import spaces
 
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.coordinates import coordinates_of
-from irl_gym.datasets import load_minari
-from irl_gym.errors import DatasetMismatch, InvalidFeatures, NotDiscrete, NotSettable, NotTabular
+from irl_gym.datasets import load_minari, recorded_environment
+from irl_gym.errors import InvalidFeatures, NotDiscrete, NotSettable
 from irl_gym.features import FeatureMap, OneHot, Unravel
+from irl_gym.integer_spaces import ranges
 from irl_gym.layouts import grid_shape
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Algorithm, Planner, ValueIteration
-from irl_gym.tabulate import make, tabulate
+from irl_gym.reveal import Reveal, known_hidden
+from irl_gym.seeded_starts import SeededStarts
+from irl_gym.tabulate import make
 
 PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 LearnerName = Literal["finite-lp", "feature-lp", "trajectory-lp"]
+Reveals = Mapping[str, int] | Literal["known"]
+KNOWN: Literal["known"] = "known"
 _ALGORITHMS: dict[str, Algorithm] = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}
 MOST_FEATURES = 256
 """Features that a default size makes at most."""
@@ -29,29 +34,48 @@ MOST_CENTRES = 15
 """Centres along a coordinate, or cosines, that a default size makes at most: those of Ng & Russell's experiment 3."""
 
 
-def environment_of(env_id: str | None, env_kwargs: Mapping[str, Any], dataset: str | None, dataset_root: str | None) -> gym.Env:
+def environment_of(
+    env_id: str | None,
+    env_kwargs: Mapping[str, Any],
+    dataset: str | None = None,
+    dataset_root: str | None = None,
+    *,
+    start_seeds: Sequence[int] = (),
+    reveal: Reveals = KNOWN,
+) -> gym.Env:
     """The environment of an id, or the one that a dataset was recorded in.
+
+    Args:
+        env_id: None for the dataset's.
+        env_kwargs: given to `gymnasium.make`.
+        dataset: a Minari id.
+        dataset_root: Minari's root folder.
+        start_seeds: seeds of the layouts that resets draw from; none for whatever resets draw.
+        reveal: hidden integers that the observation shall show, and their numbers of values; "known" for those that are
+            known to be hidden.
 
     Raises:
         UnknownEnvironment: no such id.
         DatasetMissing: no such dataset.
         DatasetMismatch: a dataset that does not say where it was recorded.
+        InvalidParameter: arguments, seeds or names that the environment does not take.
     """
-    if env_id is not None:
-        return make(env_id, **env_kwargs)
-    found = load_minari(dataset or "", root=dataset_root)
-    if found.env_spec is None:
-        raise DatasetMismatch(f"dataset {dataset!r} does not say where it was recorded: expected an environment. Name its id.")
-    return found.recover_environment()
+    if env_id is None:
+        return recorded_environment(load_minari(dataset or "", root=dataset_root))
+    env = make(env_id, **env_kwargs)
+    if start_seeds:
+        env = SeededStarts(env, tuple(start_seeds))
+    shown = known_hidden(env) if reveal == KNOWN else reveal
+    return Reveal(env, shown) if shown else env
 
 
 def steps_only(env: gym.Env) -> bool:
-    """Has an environment no table of its own?"""
+    """Has an environment no table, since its observations or actions are not integers?"""
     try:
-        tabulate(env, gamma=0.5, check_steps=0)
-    except (NotTabular, NotDiscrete):
+        ranges(env.observation_space)
+    except NotDiscrete:
         return True
-    return False
+    return not isinstance(env.action_space, spaces.Discrete)
 
 
 def planner_named(
@@ -139,9 +163,12 @@ def _bounds(env: gym.Env, coordinates: Sequence[int] | None) -> tuple[list[float
                 "whose product is theirs, such as 5 5 5 4 for Taxi. Name them, or choose one-hot."
             )
         return [0.0] * len(shape), [float(n - 1) for n in shape], Unravel(tuple(int(n) for n in shape))
+    if isinstance(space, spaces.MultiDiscrete):
+        low = space.start.ravel().astype(float)
+        return low.tolist(), (low + space.nvec.ravel() - 1).tolist(), None
     if not isinstance(space, spaces.Box):
         raise InvalidFeatures(
-            f"observations are of {space}: expected a Box or Discrete. Flatten them with Gymnasium's wrapper."
+            f"observations are of {space}: expected a Box, Discrete or MultiDiscrete. Flatten them with Gymnasium's wrapper."
         )
     low, high = space.low.ravel().astype(float), space.high.ravel().astype(float)
     if not (np.abs([low, high]) < 1e30).all():  # CartPole's velocities are unbounded, or bounded by float32's largest

@@ -9,7 +9,6 @@ import json
 import os
 import shutil
 import tempfile
-import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,21 @@ import minari
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
-from minari.data_collector import EpisodeBuffer
-from minari.dataset.minari_dataset import parse_dataset_id
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import DatasetExists, DatasetMismatch, DatasetMissing, InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.errors import (
+    DatasetMismatch,
+    DatasetMissing,
+    InvalidDemonstrations,
+    InvalidParameter,
+    NotDiscrete,
+    UnknownEnvironment,
+)
+from irl_gym.minari_files import Description, check_free, check_id, publish, write_files
+from irl_gym.minari_formats import DataFormat
 from irl_gym.states import States
+from irl_gym.watching import WATCHING
 
 _ROOT = "MINARI_DATASETS_PATH"
 
@@ -48,7 +55,7 @@ def minari_root(root: str | os.PathLike | None) -> Iterator[Path]:
 def write_minari(
     episodes: Iterable[Episode],
     dataset_id: str,
-    env: gym.Env,
+    env: gym.Env | None,
     *,
     root: str | os.PathLike | None = None,
     algorithm: str,
@@ -58,13 +65,17 @@ def write_minari(
     code_permalink: str | None = None,
     random_return: float | None = None,
     expert_return: float | None = None,
+    observation_space: spaces.Space | None = None,
+    action_space: spaces.Space | None = None,
+    data_format: DataFormat = "hdf5",
 ) -> minari.MinariDataset:
-    """Write episodes as a Minari dataset.
+    """Write episodes as a Minari dataset, one at a time: a generator of a million is never held in memory.
 
     Args:
         episodes: at least one; they may come from a generator.
         dataset_id: `namespace/name-v0`, as Minari has it.
-        env: where they were recorded; its spec is kept, so that `recover_environment()` works.
+        env: where they were recorded; its spec is kept, so that `recover_environment()` works. None when it is not known: then
+            give both spaces.
         root: Minari's root folder; None for the one in force.
         algorithm: what acted.
         author: who made it.
@@ -73,58 +84,71 @@ def write_minari(
         code_permalink: where the code is that recorded them.
         random_return: mean return of a random policy (Minari's `ref_min_score`).
         expert_return: mean return of the expert (`ref_max_score`).
+        observation_space: of the episodes; None for the environment's.
+        action_space: of the episodes; None for the environment's.
+        data_format: hdf5, or arrow, which needs the extra `data` and is a folder an episode.
 
     Raises:
-        InvalidParameter: a malformed id.
+        InvalidParameter: a malformed id, a space missing or one that Minari cannot keep, a spec that is not json, a root that
+            cannot be written, or a format that is not installed.
         DatasetExists: the id is taken.
         InvalidDemonstrations: no episode.
     """
-    try:
-        namespace, *_ = parse_dataset_id(dataset_id)
-    except (ValueError, TypeError) as error:
-        raise InvalidParameter(f"dataset id {dataset_id!r} is malformed ({error}): expected namespace/name-v0.") from error
-    with minari_root(root) as base:
-        final = base / dataset_id
-        if final.exists():
-            raise DatasetExists(
-                f"dataset {dataset_id!r} exists under {base}: Minari ids are never overwritten. Ask for the next version, "
-                "such as -v1."
-            )
-        first_action = int(getattr(env.action_space, "start", 0))
-        buffers = [_buffer(episode, first_action) for episode in episodes]
-        if not buffers:
-            raise InvalidDemonstrations("there are no episodes to write: expected at least one.")
+    metadata: dict[str, Any] = {
+        "algorithm_name": algorithm, "author": {author}, "author_email": {author_email}, "description": description,
+        "code_permalink": code_permalink, "ref_min_score": random_return, "ref_max_score": expert_return,
+    }  # fmt: skip
+    about = described(dataset_id, env, observation_space, action_space, data_format, metadata)
+    with writable_root(root) as base:
+        check_free(base, dataset_id)
         beside = Path(tempfile.mkdtemp(prefix=".writing-", dir=base))
         try:
-            with minari_root(beside), warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # Minari's hints about optional metadata
-                written = minari.create_dataset_from_buffers(
-                    dataset_id, buffers, env=env, eval_env=env if env.spec is not None else None,
-                    algorithm_name=algorithm, author=author, author_email=author_email,
-                    code_permalink=code_permalink, description=description, num_episodes_average_score=len(buffers),
-                    ref_min_score=random_return, ref_max_score=expert_return, data_format="hdf5", jpeg_encoding=False,
-                )  # fmt: skip
-                del written  # its storage is about to move
-            final.parent.mkdir(parents=True, exist_ok=True)
-            if namespace and not (base / namespace / "namespace_metadata.json").exists():
-                shutil.copyfile(beside / namespace / "namespace_metadata.json", base / namespace / "namespace_metadata.json")
-            os.replace(beside / dataset_id, final)
+            write_files(beside, about, episodes)
+            publish(beside, base, dataset_id)
         finally:
             shutil.rmtree(beside, ignore_errors=True)
         return minari.load_dataset(dataset_id)
 
 
-def _buffer(episode: Episode, first_action: int) -> EpisodeBuffer:
-    ends = np.zeros((2, len(episode)), dtype=bool)
-    ends[:, -1] = episode.terminated, episode.truncated
-    columns: dict[str, Any] = {  # Minari asks for lists, and takes arrays
-        "observations": episode.observations,
-        "actions": episode.actions + first_action,
-        "rewards": episode.rewards,
-        "terminations": ends[0],
-        "truncations": ends[1],
-    }
-    return EpisodeBuffer(seed=episode.seed, infos={}, **columns)
+def described(
+    dataset_id: str,
+    env: gym.Env | None,
+    observation_space: spaces.Space | None,
+    action_space: spaces.Space | None,
+    data_format: DataFormat,
+    metadata: dict[str, Any],
+) -> Description:
+    """What a dataset says of itself; arguments as `write_minari`, and metadata of which None is left out.
+
+    Raises:
+        InvalidParameter: as `write_minari`.
+    """
+    if env is not None:
+        observation_space = env.observation_space if observation_space is None else observation_space
+        action_space = env.action_space if action_space is None else action_space
+    if observation_space is None or action_space is None:
+        missing = "observation_space" if observation_space is None else "action_space"
+        raise InvalidParameter(f"env and {missing} are None: expected an environment, or both its spaces. Give {missing}.")
+    known = {name: value for name, value in metadata.items() if value is not None}
+    return Description(dataset_id, observation_space, action_space, None if env is None else env.spec, data_format, known)
+
+
+@contextlib.contextmanager
+def writable_root(root: str | os.PathLike | None) -> Iterator[Path]:
+    """As `minari_root`, of a folder that can be written.
+
+    Raises:
+        InvalidParameter: it cannot.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            base = stack.enter_context(minari_root(root))
+            writable = os.access(base, os.W_OK | os.X_OK)
+        except OSError as error:
+            raise InvalidParameter(f"root is {root}: expected a folder, or a place for one ({error}). Name another.") from error
+        if not writable:
+            raise InvalidParameter(f"root is {base}, which cannot be written: expected a folder of yours. Name another.")
+        yield base
 
 
 def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> minari.MinariDataset:
@@ -137,10 +161,7 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
     if root is not None and not Path(root).is_dir():
         raise DatasetMissing(f"{root} is no folder: expected Minari's root, under which {dataset_id!r} is. Name another.")
     with minari_root(root) as base:
-        try:
-            parse_dataset_id(dataset_id)
-        except (ValueError, TypeError) as error:
-            raise InvalidParameter(f"dataset id {dataset_id!r} is malformed ({error}): expected namespace/name-v0.") from error
+        check_id(dataset_id)
         if not (base / dataset_id).exists():
             found = sorted(minari.list_local_datasets())
             there = f"There are {', '.join(found[:5])}." if found else "There is none."
@@ -170,6 +191,7 @@ def read_minari(
         FileNotFoundError: no dataset of that id.
         NotDiscrete: continuous actions.
         DatasetMismatch: recorded in another environment, or one with other observations.
+        InvalidDemonstrations: no episode.
     """
     if isinstance(dataset, str):
         dataset = load_minari(dataset, root=root)
@@ -186,19 +208,55 @@ def read_minari(
             f"dataset {dataset.spec.dataset_id!r} was recorded in {_identity(dataset.env_spec)}: expected "
             f"{_identity(env.spec)}. Make the environment with `dataset.recover_environment()`."
         )
+    if not dataset.total_episodes:
+        raise InvalidDemonstrations(
+            f"dataset {dataset.spec.dataset_id!r} has no episodes: expected at least one. Record some, or name another."
+        )
     first = int(actions.start)
-    described = dataset.storage.get_episode_metadata(dataset.episode_indices)
-    for episode, metadata in zip(dataset.iterate_episodes(), described, strict=True):
+    metadatas = dataset.storage.get_episode_metadata(dataset.episode_indices)
+    for episode, metadata in zip(dataset.iterate_episodes(), metadatas, strict=True):
         yield Episode(
             episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, np.asarray(episode.rewards, float),
             bool(episode.terminations[-1]), bool(episode.truncations[-1]), metadata.get("seed"),
         )  # fmt: skip
 
 
-def _identity(spec: EnvSpec | None) -> tuple[str, dict[str, Any]] | None:
-    """What makes an environment this one: its id and arguments, but for how it is shown."""
+def recorded_environment(dataset: minari.MinariDataset) -> gym.Env:
+    """The environment that a dataset was recorded in, made anew.
+
+    Raises:
+        DatasetMismatch: the dataset does not say, or what it says cannot be made here.
+        UnknownEnvironment: an environment that is unknown here, named.
+    """
+    name, spec = dataset.spec.dataset_id, dataset.env_spec
+    if spec is None:
+        raise DatasetMismatch(
+            f"dataset {name!r} does not say where it was recorded: expected an environment. Name one with --env-id."
+        )
+    try:
+        return dataset.recover_environment()
+    except (ImportError, AttributeError, gym.error.Error) as error:
+        raise UnknownEnvironment(
+            f"environment {spec.id!r}, in which dataset {name!r} was recorded, is unknown here ({error}): expected one that "
+            "can be imported. Install or import the package that registers it, or name an environment with --env-id."
+        ) from error
+    except (TypeError, ValueError, KeyError) as error:
+        raise DatasetMismatch(
+            f"environment {spec.id!r}, in which dataset {name!r} was recorded, cannot be made here ({type(error).__name__}: "
+            f"{error}): expected it to take {spec.kwargs}. Is it another version? Name an environment with --env-id."
+        ) from error
+
+
+def _identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
+    """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
     if spec is None:
         return None
-    kwargs = json.loads(json.dumps(spec.kwargs))
+    kwargs = _plain(spec.kwargs)
     kwargs.pop("render_mode", None)
-    return spec.id, kwargs
+    wrappers = [(one.name, one.entry_point, _plain(one.kwargs)) for one in spec.additional_wrappers if one.name not in WATCHING]
+    return (spec.id, kwargs, wrappers) if wrappers else (spec.id, kwargs)
+
+
+def _plain(value: Any) -> Any:
+    """As json gives it back: lists for tuples."""
+    return json.loads(json.dumps(value, default=repr))

@@ -66,14 +66,14 @@ def _recorded(loop: "Loop") -> dict[str, Any]:
 
 
 def optimal_set(loop: "Loop") -> ActionSets:
-    """(S, A) the expert's optimal set: all optimal actions if it is optimal or known by data only, else those it takes."""
+    """(S, A) the expert's optimal set: all optimal actions if it is optimal, errs or is known by data, else those it takes."""
     world = loop.world
     if not isinstance(world, TableWorld):
         raise NotTabular("the environment is only stepped: expected a table. Which actions are optimal is not known.")
     mdp, reward = world.table.mdp, world.table.reward
     best = policy_iteration(mdp, reward)
     tolerance = metrics.TIE_TOLERANCE * float(np.abs(reward.values).max())
-    if from_data(loop) or world.value(loop.expert) >= float(mdp.d0 @ best.V) - tolerance:
+    if loop.experiment.from_episodes or world.value(loop.expert) >= float(mdp.d0 @ best.V) - tolerance:
         return tied(best.Q, tolerance)
     return support(loop.expert, mdp.n_states, mdp.n_actions)
 
@@ -89,10 +89,11 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
     world = loop.world
     if isinstance(world, TableWorld):
         worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
-        share = (expert - worst.value) / (expert - random) if expert != random else float("nan")
+        value = worst.value if world.horizon is None else world.value(worst.policy)
+        share = (expert - value) / (expert - random) if expert != random else float("nan")
         told |= {
-            "worst_tie_value": worst.value,
-            "worst_tie_regret": expert - worst.value,
+            "worst_tie_value": value,
+            "worst_tie_regret": expert - value,
             "worst_tie_regret_share": _plain(share),
         }
     stats = loop.stage("reward")["stats"]
@@ -100,13 +101,14 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
     return told | rounds | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
 
 
-STATE_LISTS = ("inseparable", "marginless", "unconstrained", "violated")
+STATE_LISTS = ("inseparable", "marginless", "unconstrained", "unknown", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 
 def _table(world: TableWorld) -> dict[str, Any]:
     mdp, evidence = world.table.mdp, world.table.evidence
     return {
+        "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
         "check": None if evidence.check is None else dict(vars(evidence.check)),

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number
+from irl_gym.choices import KNOWN, Reveals
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Learner
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import check_discount
+from irl_gym.noise import checked_epsilon
 from irl_gym.planners import Planner
 from irl_gym.rewards import plain_json
+from irl_gym.tabulate import By
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Experiment:
 
     Raises:
         InvalidDiscount: gamma outside (0, 1).
-        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset; a dataset for FiniteLP.
+        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset; noise outside 0 to 1.
     """
 
     env_id: str | None
@@ -33,6 +36,12 @@ class Experiment:
     """Discount, between 0 and 1."""
     env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Given to `gymnasium.make`."""
+    start_seeds: Sequence[int] = ()
+    """Seeds of the layouts that resets draw from (MiniGrid); none for whatever resets draw."""
+    reveal: Reveals = KNOWN
+    """Hidden integers that the observation shall show, with their numbers of values; "known": those known to be hidden."""
+    table: By | None = None
+    """How a table is made; None for what is known of the environment, and enumeration where nothing is."""
     bins: int | Sequence[int] | None = None
     """Cells a coordinate, to make a table of an environment with continuous states; None for none."""
     samples: int = 0
@@ -43,6 +52,8 @@ class Experiment:
     """Minari's root folder; None for the one in force."""
     expert: Planner | None = None
     """Plans or learns under the true reward; None for ValueIteration where there is a table, else SB3."""
+    epsilon: float = 0.0
+    """Probability of a random action in place of the expert's; above 0 a learner sees only what the episodes show."""
     episodes: int = 500
     """Demonstrations recorded."""
     learner: Learner = field(default_factory=lambda: FiniteLP(report_lambda_0=True))
@@ -66,11 +77,12 @@ class Experiment:
             raise InvalidParameter(
                 "env_id and dataset are None: expected an environment, or a dataset that was recorded in one."
             )
-        if self.dataset is not None and isinstance(self.learner, FiniteLP):
+        if self.dataset is not None and self.env_id is None and (self.start_seeds or self.reveal not in ({}, KNOWN)):
             raise InvalidParameter(
-                f"the learner is FiniteLP, and dataset is {self.dataset!r}: expected a learner that needs no action in every "
-                "state. Use FeatureLP or TrajectoryLP."
+                f"start_seeds is {self.start_seeds!r} and reveal {self.reveal!r}, but the environment is the dataset's: "
+                "expected neither. Name env_id, or leave them out."
             )
+        checked_epsilon(self.epsilon)
         checked_number("samples", self.samples, "a whole number of at least 0", least=0, whole=True)
         for name in ("episodes", "num_envs", "eval_episodes"):
             if name != "num_envs" or self.num_envs is not None:
@@ -80,6 +92,11 @@ class Experiment:
         for name in ("episodes", "num_envs", "eval_episodes", "samples", "seed"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
+
+    @property
+    def from_episodes(self) -> bool:
+        """Does a learner of tables see only what the episodes show, not the expert's whole policy?"""
+        return self.dataset is not None or self.epsilon > 0
 
     @property
     def name(self) -> str:

@@ -18,10 +18,14 @@ from irl_gym.errors import NotDiscrete, UnknownObservation
 @singledispatch
 def ranges(space: spaces.Space) -> np.ndarray:
     """The finite ranges of a space: (n, 2) rows of lowest value and count."""
-    words = " Leave text out with a wrapper that shows the rest." if isinstance(space, spaces.Text) else ""
+    mend = "Discretise the environment first."
+    if type(space).__name__ == "MissionSpace":
+        mend = "MiniGrid's environments have their whole state as integers in `irl_gym_envs:irl_gym/MiniGrid-v0`."
+    elif isinstance(space, spaces.Text):
+        mend = "Leave text out, with a wrapper that shows the rest."
     raise NotDiscrete(
         f"{space} is not made of integers: expected Discrete, MultiDiscrete, MultiBinary, an integer Box, or a Tuple or "
-        f"Dict of these.{words or ' Discretise the environment first.'}"
+        f"Dict of these. {mend}"
     )
 
 

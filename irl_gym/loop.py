@@ -1,6 +1,7 @@
 """The stages of the loop, in order, over a run folder.
 
-    table           `tabulate` or `discretize`: P, d0 and the true reward; none where the environment can only be stepped
+    table           `tabulate` or `discretize`: P, d0 and the true reward; none where the environment can only be stepped. An
+                    enumeration that was killed is continued, and a table that was made is kept
     expert          a planner on the true reward; or what a dataset says of the expert's policy
     demonstrations  episodes of the expert, a Minari dataset; or the dataset that was given
     reward          a learner: from P and the expert's policy (Ng & Russell, sections 3 and 4), or from episodes (section 5)
@@ -21,31 +22,32 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 
 from irl_gym import figures
 from irl_gym.choices import environment_of
 from irl_gym.datasets import read_minari, write_minari
-from irl_gym.demonstrations import Episode, empirical_policy
-from irl_gym.discretize import discretize
-from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.demonstrated import most_frequent, visits
+from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
+from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
 from irl_gym.learners.base import IRLResult, Learner
 from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
+from irl_gym.places import place_of
 from irl_gym.planners import Agent, Planner
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
-from irl_gym.tabulate import tabulate
+from irl_gym.table_files import keep_table
 from irl_gym.worlds import SteppedWorld, TableWorld
 
 STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
-"""After the table, which is made anew at each start: it is cheap."""
+"""After the table."""
 
 OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
@@ -71,38 +73,22 @@ class Loop:
         self.report_progress = on_progress or (lambda stage, share: None)
         self.report_progress("table", 0.0)
         start = time.perf_counter()
-        self.env = environment_of(experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root)
-        self.world: TableWorld | SteppedWorld = self._world()
         check_savable(getattr(experiment.learner, "features", None))
+        self.env = environment_of(
+            experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root,
+            start_seeds=experiment.start_seeds, reveal=experiment.reveal,
+        )  # fmt: skip
+        path, config = Path(out), experiment.to_json()
+        if (path / "config.json").exists():  # another run's folder is refused before any work
+            RunFolder(path, config)
+        self.world: TableWorld | SteppedWorld = place_of(
+            experiment, self.env, path, lambda share: self.report_progress("table", share)
+        )
         self.table_seconds = time.perf_counter() - start
-        self.folder = RunFolder(out, experiment.to_json())
+        self.folder = RunFolder(path, config)
+        if isinstance(self.world, TableWorld):
+            keep_table(self.world.table, path)
         self.report_progress("table", 1.0)
-
-    def _world(self) -> TableWorld | SteppedWorld:
-        asked, env = self.experiment, self.env
-        seed = asked.seed
-        if asked.bins is not None and isinstance(env.observation_space, spaces.Discrete):
-            raise InvalidParameter(
-                f"bins is {asked.bins}, but {asked.env_id} has discrete states: expected continuous ones. Leave bins out."
-            )
-        if asked.bins is not None:
-            method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
-            table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
-            return TableWorld(env, table, asked.num_envs or 64, seed)
-        try:
-            return TableWorld(env, tabulate(env, gamma=asked.gamma, seed=seed), asked.num_envs or 64, seed)
-        except (NotTabular, NotDiscrete) as error:
-            if not isinstance(env.action_space, spaces.Discrete):
-                raise
-            if not isinstance(asked.learner, TrajectoryLP):
-                raise type(error)(
-                    f"{asked.env_id or asked.dataset} has no table: {error} For cells give bins; or learn from episodes alone, "
-                    "with TrajectoryLP (--learner trajectory-lp)."
-                ) from error
-            world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
-            for name in ("expert", "inner", "retrain"):
-                world.check(name, getattr(asked, name))
-            return world
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""
@@ -127,6 +113,13 @@ class Loop:
         if self.experiment.dataset is not None and isinstance(self.world, SteppedWorld):
             return None
         return self.world.load(self.folder, "expert")
+
+    @cached_property
+    def seen(self) -> EmpiricalPolicy | None:
+        """What the episodes show of the expert in the table; None where a learner is given its whole policy."""
+        if not self.experiment.from_episodes or not isinstance(self.world, TableWorld):
+            return None
+        return empirical_policy(self.demonstrations, self.world.table.states, self.world.table.mdp.n_actions)
 
     @cached_property
     def agent(self) -> Any:
@@ -164,14 +157,11 @@ class Loop:
         if self.experiment.dataset is None:
             planner = self.experiment.expert or self.world.expert()
             policy = self.world.train(planner, None, self._share("expert", planner))
-            self.world.keep(policy, folder, "expert")
+            self.world.keep(policy, folder, "expert", self.experiment.epsilon)
             return {"planner": type(planner).__name__, **_steps(policy)}
-        if isinstance(self.world, TableWorld):
-            table = self.world.table
-            seen = empirical_policy(self.demonstrations, table.states, table.mdp.n_actions)
-            most = np.where(seen.visited[:, None], np.eye(table.mdp.n_actions)[seen.counts.argmax(axis=1)], np.nan)
-            np.savez(folder / "expert.npz", actions=most)
-            return {"planner": "most frequent action of the dataset", "states_seen": int(seen.visited.sum())}
+        if self.seen is not None:
+            np.savez(folder / "expert.npz", actions=most_frequent(self.seen))
+            return {"planner": "most frequent action of the dataset", "states_seen": int(self.seen.visited.sum())}
         return {"planner": "unknown: the dataset's"}
 
     def _make_demonstrations(self, folder: Path) -> dict[str, Any]:
@@ -215,9 +205,12 @@ class Loop:
             return replace(result, stats={**result.stats, "inner": type(solver).__name__})
         if not isinstance(world, TableWorld):
             raise NotTabular(f"{self.env} has no table: expected one for {type(learner).__name__}. Use TrajectoryLP.")
+        expert = self.expert if self.seen is None else most_frequent(self.seen)
         if isinstance(learner, FeatureLP):
-            return learner.fit(world.table.mdp, self.expert, states=world.table.states)
-        return learner.fit(world.table.mdp, self.expert)
+            return learner.fit(world.table.mdp, expert, states=world.table.states)
+        if isinstance(learner, FiniteLP) and self.seen is not None:
+            return learner.fit(world.table.mdp, expert, visits=visits(self.seen))
+        return learner.fit(world.table.mdp, expert)
 
     @property
     def shaped(self) -> bool:

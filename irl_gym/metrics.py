@@ -31,9 +31,24 @@ class WorstTie:
     """(S, A) the greedy actions."""
 
 
-def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any) -> float:
-    """Exact discounted value of a policy from d0: d0 . (I - gamma P_pi)^-1 R_pi."""
-    return float(mdp.d0 @ evaluate_policy(mdp, as_reward(reward), policy))
+def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any, horizon: int | None = None) -> float:
+    """Exact discounted value of a policy from d0: d0 . (I - gamma P_pi)^-1 R_pi.
+
+    Args:
+        mdp: P, gamma and d0.
+        reward: (S,) paid on arrival, or (S, A).
+        policy: (S,) actions, (S, A) probabilities or set.
+        horizon: count only this many steps; None for all.
+    """
+    if horizon is None:
+        return float(mdp.d0 @ evaluate_policy(mdp, as_reward(reward), policy))
+    mixing = mdp.mixing(policy)
+    P_pi, R_pi = mixing @ mdp.P, mixing @ as_reward(reward).expected(mdp).ravel()
+    at, value = mdp.d0, 0.0
+    for time in range(horizon):
+        value += mdp.gamma**time * float(at @ R_pi)
+        at = at @ P_pi
+    return value
 
 
 def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:

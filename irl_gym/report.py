@@ -45,10 +45,11 @@ def _policies(report: Report) -> Table:
 def _how_valued(report: Report) -> str:
     """Where the values come from, in a few words."""
     table = report.metrics["table"]
-    given = ", the expert's from its episodes" if report.metrics["demonstrations"]["given"] else ""
     if table is None:
         return "discounted, from the start, mean of episodes"
-    return f"{'exact' if table['exact'] else 'exact on the cells'}, discounted, from the start{given}"
+    given = f", of {table['horizon']} steps, the expert's from its episodes" if table["horizon"] is not None else ""
+    where = "exact" if table["exact"] else "exact on a table that is an estimate"
+    return f"{where}, discounted, from the start{given}"
 
 
 def _reward(report: Report) -> Table:

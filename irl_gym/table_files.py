@@ -20,6 +20,29 @@ from irl_gym.selfcheck import Payments, SelfCheck
 from irl_gym.states import StateIndex
 from irl_gym.tabulation import Evidence, Tabulation
 
+TABLE = "table.npz"
+"""The table in the folder of a run."""
+UNDER_WAY = ".enumeration.tmp.npz"
+"""An enumeration that is not finished, there."""
+
+
+def keep_table(table: Tabulation, folder: Path) -> None:
+    """Keep a table in a folder, unless it is there; forget the enumeration that led to it."""
+    if not (folder / TABLE).exists() and isinstance(table.states, StateIndex | ListedStates):
+        save_table(table, folder / TABLE)
+    (folder / UNDER_WAY).unlink(missing_ok=True)
+
+
+def kept_table(folder: Path, space: spaces.Space) -> Tabulation | None:
+    """The table that a folder keeps; None where there is none that can be read, and it has to be made again."""
+    try:
+        return load_table(folder / TABLE, space)
+    except FileNotFoundError:
+        return None
+    except InvalidMDP:
+        (folder / TABLE).unlink()
+        return None
+
 
 def save_table(table: Tabulation, path: str | os.PathLike) -> None:
     """Write a table whose states are integers (a StateIndex or ListedStates); beside first, then renamed.

@@ -19,12 +19,13 @@ from irl_gym import metrics
 from irl_gym.demonstrations import Episode, collect, collect_from_table
 from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
+from irl_gym.noise import Noisy, noisy
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
-from irl_gym.run_folder import RunFolder
+from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.simulator import RandomPolicy
 from irl_gym.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.tabulation import Tabulation
@@ -54,6 +55,8 @@ class TableWorld:
     """Copies that SB3 trains on."""
     seed: int
     """Of agents."""
+    horizon: int | None = None
+    """Steps that values count; None for all. The time limit, where the expert's value is that of episodes that were cut."""
 
     @property
     def gamma(self) -> float:
@@ -87,12 +90,16 @@ class TableWorld:
         """A reward of either kind in the table."""
         return reward.tabular(self.table.states) if isinstance(reward, LinearReward) else reward
 
-    def keep(self, policy: Policy, folder: Path, name: str) -> None:
-        """Write the actions; an agent in SB3's zip too."""
+    def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
+        """Write the actions, or with noise or of a table with several the probabilities; an agent in SB3's zip too."""
         if isinstance(policy, Agent):
             policy.save(folder / f"{name}.zip")
-        file = "expert.npz" if name == "expert" else f"{name}_policy.npz"
-        np.savez(folder / file, actions=tabular_actions(policy, self.table.states))
+        actions: Any = tabular_actions(policy, self.table.states)
+        if isinstance(policy, TabularPolicy) and not (policy.probabilities.max(axis=1) == 1).all():
+            actions = policy.probabilities
+        if epsilon:
+            actions = noisy(actions, epsilon, self.table.mdp.n_actions)
+        np.savez(folder / ("expert.npz" if name == "expert" else f"{name}_policy.npz"), actions=actions)
 
     def load(self, folder: RunFolder, name: str) -> np.ndarray:
         """(S,) actions; (S, A) probabilities of an expert read from data, NaN where nothing is known of it."""
@@ -114,7 +121,7 @@ class TableWorld:
 
     def value(self, policy: Any) -> float:
         """Exact discounted value from d0 under the true reward; the grid's, where the table is of cells."""
-        return metrics.policy_value(self.table.mdp, self.table.reward, policy)
+        return metrics.policy_value(self.table.mdp, self.table.reward, policy, self.horizon)
 
     def glance(self, policy: Policy) -> float:
         """The same, of a policy in training."""
@@ -179,17 +186,19 @@ class SteppedWorld:
         finally:
             env.close()
 
-    def keep(self, policy: Policy, folder: Path, name: str) -> None:
-        """Write an agent in SB3's zip."""
+    def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
+        """Write an agent in SB3's zip, its algorithm and its noise as json."""
         if not isinstance(policy, Agent):
             raise InvalidParameter(f"{type(policy).__name__} cannot be kept: expected an agent of SB3. Use SB3 as planner.")
         policy.save(folder / f"{name}.zip")
-        (folder / f"{name}.txt").write_text(type(policy.model).__name__)
+        write_json(folder / f"{name}.json", {"algorithm": type(policy.model).__name__, "epsilon": epsilon})
 
     def load(self, folder: RunFolder, name: str) -> Policy:
         """The agent: a file of this run's own, so SB3 may load it."""
-        algorithm: Any = folder.load(f"{name}.txt", Path.read_text)
-        return folder.load(f"{name}.zip", lambda path: load_agent(path, algorithm))
+        made: Any = folder.load(f"{name}.json", read_json)
+        agent = folder.load(f"{name}.zip", lambda path: load_agent(path, made["algorithm"]))
+        space: Any = self.env.action_space
+        return Noisy(agent, made["epsilon"], int(space.n), self.seed) if made["epsilon"] else agent
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a policy, deterministic but for the random one."""

@@ -1,15 +1,26 @@
 """Minari datasets: plain Minari opens them, and they come back as they were."""
 
+import json
+
 import gymnasium as gym
 import minari
 import numpy as np
 import pytest
+import tiny_env
 from gymnasium import spaces
 from minari.data_collector import EpisodeBuffer
 
-from irl_gym.datasets import load_minari, minari_root, read_minari, write_minari
+from irl_gym.datasets import load_minari, minari_root, read_minari, recorded_environment, write_minari
 from irl_gym.demonstrations import Episode, collect
-from irl_gym.errors import DatasetExists, DatasetMismatch, DatasetMissing, InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.errors import (
+    DatasetExists,
+    DatasetMismatch,
+    DatasetMissing,
+    InvalidDemonstrations,
+    InvalidParameter,
+    NotDiscrete,
+    UnknownEnvironment,
+)
 from irl_gym.policies import TabularPolicy
 from irl_gym.states import StateIndex
 
@@ -184,3 +195,99 @@ def test_minari_root_is_restored(tmp_path, monkeypatch):
     import os
 
     assert "MINARI_DATASETS_PATH" not in os.environ
+
+
+SPACES = {"observation_space": spaces.Discrete(16), "action_space": spaces.Discrete(4)}
+
+
+def test_spaces_alone_make_a_dataset_that_names_no_environment(episodes, tmp_path):
+    dataset = write(episodes, None, tmp_path, **SPACES)
+    assert dataset.env_spec is None and dataset.observation_space == spaces.Discrete(16)
+    with pytest.raises(DatasetMismatch, match=f"{ID}' does not say where .* --env-id"):
+        recorded_environment(dataset)
+
+
+@pytest.mark.parametrize("missing", SPACES)
+def test_no_environment_and_no_space_are_refused(episodes, tmp_path, missing):
+    with pytest.raises(InvalidParameter, match=f"Give {missing}"):
+        write(episodes, None, tmp_path, **{**SPACES, missing: None})
+
+
+def test_a_space_that_minari_cannot_keep_is_refused(episodes, tmp_path):
+    with pytest.raises(InvalidParameter, match=r"observation_space is Sequence.*Minari can keep"):
+        write(episodes, None, tmp_path, **{**SPACES, "observation_space": spaces.Sequence(spaces.Discrete(2))})
+
+
+@pytest.mark.parametrize("data_format", ["hdf5", "arrow"])
+def test_both_formats_hold_the_same(episodes, env, tmp_path, data_format):
+    write(iter(episodes), env, tmp_path, data_format=data_format)
+    assert [str(vars(one)) for one in read_minari(ID, root=tmp_path)] == [str(vars(one)) for one in episodes]
+
+
+def test_another_format_is_refused(unchecked, episodes, env, tmp_path):
+    with pytest.raises(InvalidParameter, match="data_format is 'csv'"):
+        write(episodes, env, tmp_path, data_format="csv")
+
+
+def test_the_environment_that_was_recorded_is_made(root, env):
+    assert recorded_environment(load_minari(ID, root=root)).spec.kwargs == env.spec.kwargs
+
+
+def rewritten(root, **changes):
+    """The dataset, with another environment in its spec."""
+    path = root / ID / "data" / "metadata.json"
+    content = json.loads(path.read_text())
+    content["env_spec"] = json.dumps({**json.loads(content["env_spec"]), **changes})
+    path.write_text(json.dumps(content))
+    return load_minari(ID, root=root)
+
+
+def test_an_environment_that_is_unknown_here_is_named(root):
+    dataset = rewritten(root, id="their/Maze-v3", entry_point="their_package:Maze")
+    with pytest.raises(UnknownEnvironment, match=r"'their/Maze-v3'.*their_package.*package that registers it.*--env-id"):
+        recorded_environment(dataset)
+
+
+def test_an_environment_that_takes_other_arguments_here_is_refused(root):
+    with pytest.raises(DatasetMismatch, match=r"cannot be made here.*depth"):
+        recorded_environment(rewritten(root, kwargs={"depth": 3}))
+
+
+def test_an_empty_dataset_is_refused_when_read(env, tmp_path):
+    with minari_root(tmp_path):
+        minari.create_dataset_from_buffers("empty-v0", [], env=env)
+    with pytest.raises(InvalidDemonstrations, match="'empty-v0' has no episodes"):
+        next(read_minari("empty-v0", root=tmp_path))
+
+
+def test_a_wrapper_makes_another_environment(episodes, env, tmp_path):
+    write(episodes, gym.wrappers.ClipReward(env, 0, 1), tmp_path)
+    for other in (env, gym.wrappers.ClipReward(env, 0, 0.5)):
+        with pytest.raises(DatasetMismatch, match="ClipReward"):
+            next(read_minari(ID, root=tmp_path, env=other))
+    assert sum(1 for _ in read_minari(ID, root=tmp_path, env=gym.wrappers.ClipReward(env, 0, 1))) == 5
+
+
+def test_a_wrapper_that_only_watches_makes_no_other_environment(root, env):
+    assert sum(1 for _ in read_minari(ID, root=root, env=gym.wrappers.RecordEpisodeStatistics(env))) == 5
+
+
+@pytest.fixture
+def registered():
+    """An environment registered with its class, as a user's own mostly is."""
+    gym.register("tests/Coin-v0", entry_point=tiny_env.TableEnv, kwargs={"P": tiny_env.coin(), "start": [1.0, 0.0]})
+    yield gym.make("tests/Coin-v0", disable_env_checker=True)
+    del gym.registry["tests/Coin-v0"]
+
+
+def test_an_environment_registered_with_its_class_is_made_again(registered, tmp_path):
+    actor = TabularPolicy(np.ones((2, 1)), StateIndex(spaces.Discrete(2)))
+    dataset = write(collect(registered, actor, 3), registered, tmp_path)
+    assert type(recorded_environment(dataset).unwrapped) is tiny_env.TableEnv
+
+
+def test_an_environment_that_nobody_could_make_again_is_refused(episodes, env, tmp_path):
+    env.unwrapped.spec.entry_point = lambda: None
+    with pytest.raises(InvalidParameter, match=r"FrozenLake-v1 cannot be written as json.*entry_point='module:Class'"):
+        write(episodes, env, tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from irl_gym.datasets import minari_root
-from irl_gym.errors import DegenerateExpert, InvalidParameter, NotTabular, RunConflict, UnknownEnvironment
+from irl_gym.errors import DegenerateExpert, InvalidParameter, NotDiscrete, RunConflict, UnknownEnvironment
 from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.loop import Loop
@@ -136,7 +136,7 @@ def test_our_own_environments_work_by_module_and_id(tmp_path):
 
 @pytest.mark.parametrize(
     ("env_id", "error", "match"),
-    [("FrozenLaek-v1", UnknownEnvironment, "FrozenLake-v1"), ("Blackjack-v1", NotTabular, "Blackjack")],
+    [("FrozenLaek-v1", UnknownEnvironment, "FrozenLake-v1"), ("CartPole-v1", NotDiscrete, "floats")],
 )
 def test_an_environment_that_cannot_be_used_is_refused_before_anything_is_written(tmp_path, env_id, error, match):
     with pytest.raises(error, match=match):

@@ -190,7 +190,7 @@ COMMON = ("expert optimal under it", "features", "score")
 SAID = {
     "table, features": (*COMMON, "rank", "sample", "margin cap", "worst-tie regret", "exact, discounted"),
     "table, trajectories": (*COMMON, "best round", "distance", "cut after", "noise alone makes about"),
-    "cells, features": (*COMMON, "exact on the cells"),
+    "cells, features": (*COMMON, "exact on a table that is an estimate"),
     "steps, trajectories": (*COMMON, "mean of episodes", "best round"),
     "dataset, features": (*COMMON, "the expert's from its episodes"),
 }

@@ -43,9 +43,13 @@ class Explored:
         self.first_line = array("q", [0])
         """Where the lines of each state begin, in the order of the numbers."""
         self.starts: dict[int, float] = {}
-        self.counted: dict[str, int] = {"rows": 0, "runs": 0, "lines": 0}
-        """Pairs (and starts) whose draws could not be enumerated, the runs made of them, and the lines they gave."""
+        self.counted: dict[str, int] = {"rows": 0, "runs": 0, "fewest": 0, "lines": 0, "refusals": 0}
+        """Pairs (and starts) whose draws could not be enumerated, the runs made of them in all, and of one at least, the lines
+        they gave; and the calls that refused to be enumerated."""
+        self.always: tuple[str, ...] = ()
+        """Attributes that belong to the inner state however large they are."""
         self.keys: list[Hashable] = []
+        self._whole = (0, 0, 0, dict(self.counted))
 
     @property
     def n_expanded(self) -> int:
@@ -73,6 +77,11 @@ class Explored:
             self.probabilities.append(probability)
             self.rewards.append(reward)
         self.first_line.append(len(self.rows))
+        self.settle()
+
+    def settle(self) -> None:
+        """What has been found up to here is whole: a file holds no half of a state, whenever the search is interrupted."""
+        self._whole = (len(self.keys), len(self.ends), self.n_expanded, dict(self.counted))
 
     def lines_of(self, number: int) -> list[tuple[int, int, float, float]]:
         """The lines of an expanded state: action, successor, probability, reward."""
@@ -97,21 +106,25 @@ class Explored:
         return 300 * len(self.keys) + 32 * len(self.rows) + 150 * len(self.ends)
 
     def save(self, path: Path, space: spaces.Space, identity: dict[str, Any]) -> None:
-        """Write everything; beside first, then renamed."""
-        lengths = np.array([len(script) for script in self.scripts], dtype=np.int64)
+        """Write all that is whole; beside first, then renamed."""
+        n, e, expanded, counted = self._whole
+        m = self.first_line[expanded]
+        scripts = self.scripts[:n]
         k = len(numbers_of_keys(space, self.keys[:1])[0])
-        ends = numbers_of_keys(space, list(self.ends)) if self.ends else np.zeros((0, k), dtype=np.int64)
+        ends = numbers_of_keys(space, list(self.ends)[:e]) if e else np.zeros((0, k), dtype=np.int64)
         path.parent.mkdir(parents=True, exist_ok=True)
         beside = path.with_name(f".{path.name}.tmp.npz")
         np.savez(
             beside,
-            identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(self.counted)),
-            states=numbers_of_keys(space, self.keys), ends=ends,
-            parents=np.array(self.parents), actions=np.array(self.actions),
-            script_lengths=lengths, scripts=np.array([one for script in self.scripts for one in script], dtype=np.int64),
-            rows=np.array(self.rows), successors=np.array(self.successors),
-            probabilities=np.array(self.probabilities), rewards=np.array(self.rewards),
-            first_line=np.array(self.first_line),
+            identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(counted)),
+            always=np.array(json.dumps(self.always)),
+            states=numbers_of_keys(space, self.keys[:n]), ends=ends,
+            parents=np.array(self.parents[:n]), actions=np.array(self.actions[:n]),
+            script_lengths=np.array([len(script) for script in scripts], dtype=np.int64),
+            scripts=np.array([one for script in scripts for one in script], dtype=np.int64),
+            rows=np.array(self.rows[:m]), successors=np.array(self.successors[:m]),
+            probabilities=np.array(self.probabilities[:m]), rewards=np.array(self.rewards[:m]),
+            first_line=np.array(self.first_line[: expanded + 1]),
             start_numbers=np.array(list(self.starts), dtype=np.int64), start_values=np.array(list(self.starts.values())),
         )  # fmt: skip
         os.replace(beside, path)
@@ -126,9 +139,9 @@ def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dic
     try:
         with np.load(path, allow_pickle=False) as archive:
             found = {name: archive[name] for name in archive.files}
-        asked = json.loads(str(found["identity"]))
+        asked = dict(json.loads(str(found["identity"])))
         explored = _rebuilt(found, space, n_actions)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
         raise RunConflict(
             f"{path} holds no enumeration ({error}): expected one to continue. Remove it to begin anew."
         ) from error
@@ -156,5 +169,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) 
         setattr(explored, name, array("d", found[name].astype(float).tolist()))
     explored.first_line = array("q", found["first_line"].tolist())
     explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
-    explored.counted = json.loads(str(found["counted"]))
+    explored.counted = dict(json.loads(str(found["counted"])))
+    explored.always = tuple(json.loads(str(found["always"])))
+    explored.settle()
     return explored

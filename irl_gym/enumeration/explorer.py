@@ -1,28 +1,35 @@
 """Breadth-first search over the states of an environment that can be copied.
 
 A state is an observation. From a copy of the environment in that state each action is tried, in every outcome of its draws
-(`irl_gym.enumeration.trials`). An observation that is met again in another inner state is tried again: where it then behaves
-differently, it hides something, and `HiddenState` names the pair that proves it. Axes: A actions.
+(`irl_gym.enumeration.trials`). An observation that is met again in another inner state is tried again, and so are those that
+follow it: where one then behaves differently, it hides something, and `HiddenState` names the pair that proves it. Axes: A
+actions.
 """
 
 import time
+from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 
 from irl_gym.enumeration.explored import Explored
-from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proof, shown, unlike
+from irl_gym.enumeration.hidden_state import SAME, Behaviour, behaviour_of_lines, proof, shown, unlike
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.trials import Outcomes, Trials
-from irl_gym.errors import EnumerationLimit, HiddenState, NotTabular, RunConflict
-from irl_gym.integer_spaces import key_of
+from irl_gym.enumeration.replays import Replays, another
+from irl_gym.enumeration.trials import MOST_REFUSALS, Outcomes, Trials
+from irl_gym.errors import EnumerationLimit, HiddenState, IrlGymError, NotTabular, UnknownObservation
+from irl_gym.integer_spaces import as_batch, checked_members, key_of, to_numbers
 
 CERTAIN = 1_000
 """Of the first states found, every one is tried again in other inner states; of later ones, each tenth."""
 MANY_STARTS = 100
 """First observations, counted, above which most have to come more than once: else they could not all be listed."""
+CHECKED = 20
+"""States of an earlier search that are tried again before it is continued."""
+
+Way = int | tuple[Any, int]
+"""How an inner state was reached: as a state was found, by its number (-1: reset); or by another way and one more action."""
 
 
 class Explorer:
@@ -40,15 +47,18 @@ class Explorer:
         space: Any = env.action_space
         self.limits, self.n_actions = limits, int(space.n)
         self.space = env.observation_space
-        self.key = key_of(self.space)
+        self._key_of = key_of(self.space)
         self.trials = Trials(env, limits, always, counting)
         self.compared = 0
         self._waiting: dict[int, Any] = {}
-        self._marks: dict[int, int] = {}
-        self._tries: dict[int, int] = {}
-        self._newcomers: dict[int, list[tuple[Any, list[int]]]] = {}
+        self._marks: dict[int, tuple[int, ...]] = {}
+        self._arrivals: dict[int, int] = {}
+        self._revisits: dict[int, int] = {}
+        self._newcomers: dict[int, list[tuple[int, Any, Way]]] = {}
+        self._doubts: deque[tuple[int, Any, Way]] = deque()
         self._held = 0
         self.explored = explored or Explored(self.n_actions)
+        self._replays = Replays(self.explored, self.trials, self.space, self._key)
         if explored is None:
             self._begin()
         else:
@@ -68,8 +78,9 @@ class Explorer:
             state = self._waiting.pop(number)
             self._held -= _size(state)
             explored.expand(number, [line for action in range(self.n_actions) for line in self._row(number, state, action)])
-            for newcomer, way in self._newcomers.pop(number, ()):
-                self._compare(number, newcomer, way, state)
+            self._doubts.extend(self._newcomers.pop(number, ()))
+            while self._doubts:
+                self._compare(*self._doubts.popleft())
             self._check_limits(time.monotonic() - began)
             yield
 
@@ -86,6 +97,7 @@ class Explorer:
             key, state = one.made
             number = self._arrive(key, state, one.script, -1, -1)
             self.explored.starts[number] = self.explored.starts.get(number, 0.0) + one.probability
+        self.explored.settle()
 
     def _row(self, number: int, state: Any, action: int) -> list[tuple[int, int, float, float]]:
         """The lines of one pair; new states are numbered."""
@@ -100,70 +112,112 @@ class Explorer:
         return [(action, successor, probability, reward) for (successor, reward), probability in found.items()]
 
     def _count(self, seen: Outcomes) -> None:
-        successors = {(one.made[0], one.result[2]) for one in seen.all}
-        if seen.runs and len(successors) > 1:
-            counted = self.explored.counted
+        counted = self.explored.counted
+        counted["refusals"] = self.trials.refusals
+        if seen.runs:
             counted["rows"] += 1
             counted["runs"] += seen.runs
-            counted["lines"] += len(successors)
+            counted["fewest"] = min(counted["fewest"] or seen.runs, seen.runs)
+            counted["lines"] += len({(one.made[0], one.result[2]) for one in seen.all})
 
     def _keep(self, result: tuple[Any, float, bool]) -> tuple[Any, Any]:
         """Key of an outcome, and its inner state where the observation is new or is doubted; None elsewhere."""
         observation, _, terminated = result
-        key = self.key(observation)
+        key = self._key(observation)
         number = self.explored.ids.get(key)
+        if number is None and key not in self.explored.ends:
+            checked_members(self.space, to_numbers(self.space, as_batch(self.space, observation)))
         wanted = not terminated and (number is None or self._doubted(number))
         return key, self.trials.snapshots.take() if wanted else None
 
     def _doubted(self, number: int) -> bool:
         allowed = self.limits.revisits if number < CERTAIN or number % 10 == 0 else 0
-        return self._tries.get(number, 0) < 4 * allowed
+        return self._arrivals.get(number, 0) < 4 * allowed and self._revisits.get(number, 0) < allowed
+
+    def _key(self, observation: Any) -> Any:
+        try:
+            return self._key_of(observation)
+        except IrlGymError:
+            raise
+        except Exception as error:  # whatever an observation of another kind brings about
+            raise UnknownObservation(
+                f"observation {' '.join(repr(observation).split())[:90]} cannot be read ({error}): expected a member of "
+                f"{self.space}."
+            ) from error
 
     def _arrive(self, key: Any, state: Any, script: tuple[int, ...], parent: int, action: int) -> int:
         """The number of a state that was seen, new or known."""
         number = self.explored.ids.get(key)
         if number is None:
             number = self.explored.add(key, parent, action, script)
-            self._waiting[number], self._marks[number] = state, _mark(state)
+            self._waiting[number], self._marks[number] = state, (_mark(state),)
             self._held += _size(state)
         elif state is not None:
-            self._tries[number] = self._tries.get(number, 0) + 1
-            if _mark(state) != self._marks.get(number, 0):
-                way = [*self.explored.way(parent), action] if parent >= 0 else []
-                if number < self.explored.n_expanded:
-                    self._compare(number, state, way, None)
-                elif len(self._newcomers.setdefault(number, [])) < self.limits.revisits:
-                    self._newcomers[number].append((state, way))
+            self._doubt(number, state, (parent, action) if parent >= 0 else -1)
         return number
 
-    def _compare(self, number: int, newcomer: Any, way: list[int], state: Any) -> None:
+    def _doubt(self, number: int, state: Any, way: Way) -> None:
+        """Compare a state in another inner state, now or when it has been expanded."""
+        self._arrivals[number] = self._arrivals.get(number, 0) + 1
+        mark, marks = _mark(state), self._marks.get(number, ())
+        if mark in marks:
+            return
+        self._marks[number] = (*marks, mark)
+        if number < self.explored.n_expanded:
+            self._doubts.append((number, state, way))
+        elif len(self._newcomers.setdefault(number, [])) < self.limits.revisits:
+            self._newcomers[number].append((number, state, way))
+
+    def _compare(self, number: int, newcomer: Any, way: Way) -> None:
         """Does a state behave the same in another inner state? Counts, which differ by chance, are not compared."""
-        if self.explored.counted["rows"]:
+        if self.explored.counted["rows"] or self._revisits.get(number, 0) >= self.limits.revisits:
+            return
+        self._revisits[number] = self._revisits.get(number, 0) + 1
+        refusals, reached = self.trials.refusals, []
+        first, second = behaviour_of_lines(self.explored.lines_of(number)), self._behaviour(newcomer, reached)
+        self.trials.refusals = refusals
+        if second is None:
             return
         self.compared += 1
-        self._tries[number] = self._tries.get(number, 0) + 3
-        first, second = behaviour_of_lines(self.explored.lines_of(number)), self._behaviour(newcomer)
         action = unlike(first, second)
         if action is not None:
-            state = self._replayed(number) if state is None else state
-            differ = self.trials.snapshots.differences(state, newcomer)
-            raise HiddenState(proof(self.explored, self.space, number, action, first, second, way, differ))
+            differ = self.trials.snapshots.differences(self._replays.state(number), newcomer)
+            raise HiddenState(proof(self.explored, self.space, number, action, first, second, self._actions(way), differ))
+        for after, taken, state in reached:
+            self._doubt(after, state, (way, taken))
 
-    def _behaviour(self, state: Any) -> Behaviour:
+    def _behaviour(self, state: Any, reached: list[tuple[int, int, Any]], number: int | None = None) -> Behaviour | None:
+        """What an inner state does; None where that has to be counted, and no `number` says with which seeds.
+
+        The inner states that follow are added to `reached`: number, action, state.
+        """
         found: Behaviour = {}
         for action in range(self.n_actions):
-            seen = self.trials.outcomes(self.trials.step(state, action), -1, lambda _: None, runs=1)
+            row, runs = (-1, 1) if number is None else (number * self.n_actions + action, self.limits.runs)
+            seen = self.trials.outcomes(self.trials.step(state, action), row, self._keep, runs=runs)
+            if seen.runs and number is None:
+                return None
             for one in seen.all:
-                observation, reward, terminated = one.result
-                key = self.key(observation)
+                (_, reward, terminated), (key, follows) = one.result, one.made
                 known = self.explored.ends.get(key) if terminated else self.explored.ids.get(key)
                 successor = (key, terminated) if known is None else -1 - known if terminated else known
                 place = action, successor, round(reward, 9)
                 found[place] = found.get(place, 0.0) + one.probability
+                if follows is not None and known is not None:
+                    reached.append((known, action, follows))
         return found
+
+    def _actions(self, way: Way) -> list[int]:
+        last: list[int] = []
+        while isinstance(way, tuple):
+            way, action = way
+            last.append(action)
+        return [*(self.explored.way(way) if way >= 0 else []), *reversed(last)]
 
     def _check_limits(self, seconds: float) -> None:
         limits, explored = self.limits, self.explored
+        if explored.n_expanded == len(explored.keys) <= limits.max_states:
+            return
         size = explored.size + self._held
         expected = None
         if len(explored.keys) > limits.max_states:
@@ -180,43 +234,41 @@ class Explorer:
                 "it stopped."
             )
 
-    # An earlier search is continued by playing its paths again: no copy of an environment is ever written to a file.
+    # An earlier search is continued from the inner states that its paths lead to.
 
     def _continue(self) -> None:
-        explored = self.explored
-        wanted = [False] * len(explored.keys)
-        for waiting in range(explored.n_expanded, len(explored.keys)):
-            number = waiting
-            while number >= 0 and not wanted[number]:
-                wanted[number] = True
-                number = explored.parents[number]
-        states: dict[int, Any] = {}
-        for number in np.flatnonzero(wanted).tolist():  # parents before children
-            states[number] = self._again(number, states.get(explored.parents[number]))
-        self._waiting = {number: states[number] for number in range(explored.n_expanded, len(explored.keys))}
-        self._marks = {number: _mark(state) for number, state in states.items()}
+        self._check_kept()
+        states = self._replays.waiting()
+        self._waiting = {number: state for number, state in states.items() if number >= self.explored.n_expanded}
+        self._marks = {number: (_mark(state),) for number, state in states.items()}
         self._held = sum(map(_size, self._waiting.values()))
 
-    def _replayed(self, number: int) -> Any:
-        """The inner state in which a state was found first."""
-        state = None
-        for one in self.explored.path(number):
-            state = self._again(one, state)
-        return state
+    def _check_kept(self) -> None:
+        """Does the environment still do what is kept, at a reset and in some states? Nothing is changed by asking.
 
-    def _again(self, number: int, before: Any) -> Any:
-        """The inner state of a state, from its parent's."""
+        Raises:
+            RunConflict: it does something else, as the same class with other arguments would.
+        """
         explored, trials = self.explored, self.trials
-        parent, action, script = explored.parents[number], explored.actions[number], explored.scripts[number]
-        call = trials.reset() if parent < 0 else trials.step(before, action)
-        observation, _, _ = trials.again(call, -1 if parent < 0 else parent * self.n_actions + action, script)
-        if self.key(observation) != explored.keys[number]:
-            raise RunConflict(
-                f"the enumeration that was kept led to {shown(self.space, explored.keys[number])} where the environment now "
-                f"leads to {shown(self.space, self.key(observation))}: expected the same environment. Remove the file to begin "
-                "anew."
-            )
-        return trials.snapshots.take()
+        seen = trials.outcomes(trials.reset(), -1, lambda result: self._key(result[0]), runs=self.limits.start_runs)
+        starts: dict[int | None, float] = {}
+        for one in seen.all:
+            number = explored.ids.get(one.made)
+            starts[number] = starts.get(number, 0.0) + one.probability
+        if starts.keys() != explored.starts.keys() or any(abs(p - explored.starts[s or 0]) > SAME for s, p in starts.items()):
+            raise another("begins otherwise than the environment does now")
+        for number in sorted({i * (explored.n_expanded - 1) // (CHECKED - 1) for i in range(CHECKED)} - {-1}):
+            state, kept = self._replays.state(number), behaviour_of_lines(explored.lines_of(number))
+            if not any(self._kept(number, state, kept, refusals) for refusals in (0, MOST_REFUSALS)):
+                raise another(
+                    f"goes on from {shown(self.space, explored.keys[number])} otherwise than the environment does now"
+                )
+        trials.refusals = explored.counted["refusals"]
+
+    def _kept(self, number: int, state: Any, kept: Behaviour, refusals: int) -> bool:
+        self.trials.refusals = refusals
+        again = self._behaviour(state, [], number)
+        return again is not None and unlike(kept, again) is None
 
 
 def _mark(state: Any) -> int:

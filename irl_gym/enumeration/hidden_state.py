@@ -70,7 +70,7 @@ def _actions(way: list[int]) -> str:
     """Actions, those of a long way shortened."""
     if not way:
         return "reset"
-    return f"actions {way}" if len(way) <= 12 else f"{len(way)} actions that end with {way[-12:]}"
+    return f"actions {way}" if len(way) <= 30 else f"{len(way)} actions that end with {way[-30:]}"
 
 
 def shown(space: spaces.Space, key: Any) -> str:

@@ -8,6 +8,7 @@ not the environment's own): those steps are run many times and counted, and the 
 import json
 import math
 import os
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.trials import OutsideRandomness
-from irl_gym.errors import HiddenState
+from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.reveal import known_hidden
@@ -32,6 +33,8 @@ from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
 
 OnStates = Callable[[int, int], None]
 """Called with the number of states tried and found, as the search goes on."""
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+"""In the words for an object that has none of its own: another one in every process."""
 GUARDED = 500
 """States tried between two looks at what was held to be constant."""
 
@@ -54,6 +57,8 @@ class Enumeration(Limits):
     def __post_init__(self) -> None:
         super().__post_init__()
         checked_number("every", self.every, "seconds, at least 0", least=0)
+        if not isinstance(self.checkpoint, str | os.PathLike | None):
+            raise InvalidParameter(f"checkpoint is {self.checkpoint!r}: expected the path of a file, or None.")
 
     def table(self, env: gym.Env, gamma: float, progress: OnStates | None = None, /) -> Tabulation:
         """Enumerate the states of an environment; it is copied, neither stepped nor reset.
@@ -72,7 +77,7 @@ class Enumeration(Limits):
         """
         ranges(env.observation_space)  # refuses floats before anything is copied
         explored, compared = self._explore(env, progress or (lambda tried, found: None))
-        return _assembled(explored, env, gamma, compared, self.runs)
+        return _assembled(explored, env, gamma, compared)
 
     def _explore(self, env: gym.Env, on_states: OnStates) -> tuple[Explored, int]:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
@@ -84,11 +89,14 @@ class Enumeration(Limits):
                 space: Any = env.action_space
                 explored = load_explored(Path(self.checkpoint), env.observation_space, int(space.n), self._identity(env))
                 counting = counting or bool(explored.counted.get("outside"))
+                always |= frozenset(explored.always)
             try:
                 own = without_watchers(env)
                 own.reset(seed=self.seed)
                 explorer = Explorer(own, self, explored, always, counting)
                 explorer.explored.counted["outside"] = int(counting)
+                explorer.explored.always = tuple(sorted(always))
+                explorer.explored.settle()
                 self._run(explorer, env, on_states)
                 return explorer.explored, explorer.compared
             except ConstantChanged as error:
@@ -102,7 +110,6 @@ class Enumeration(Limits):
 
     def _run(self, explorer: Explorer, env: gym.Env, on_states: OnStates) -> None:
         written = told = time.monotonic()
-        complete = False
         try:
             for count, _ in enumerate(explorer.expand(), start=1):
                 now = time.monotonic()
@@ -115,17 +122,16 @@ class Enumeration(Limits):
                     _guard(explorer)
                     self._save(explorer, env)
                     written = time.monotonic()
-            _guard(explorer)
-            complete = True
         except KeyboardInterrupt:
-            complete = True
-            raise
-        except Exception as error:
-            complete = type(error).__name__ == "EnumerationLimit"
-            raise
-        finally:
-            if complete and self.checkpoint is not None:
+            if not explorer.trials.snapshots.changed_constants():
                 self._save(explorer, env)
+            raise
+        except EnumerationLimit:
+            _guard(explorer)
+            self._save(explorer, env)
+            raise
+        _guard(explorer)
+        self._save(explorer, env)
         on_states(explorer.explored.n_expanded, len(explorer.explored.keys))
 
     def _save(self, explorer: Explorer, env: gym.Env) -> None:
@@ -147,7 +153,7 @@ class Enumeration(Limits):
         return {
             "environment": f"{kind.__module__}.{kind.__qualname__}",
             "wrappers": layers,
-            "spec": None if spec is None else json.loads(json.dumps([spec.id, spec.kwargs], default=repr)),
+            "spec": None if spec is None else json.loads(_ADDRESS.sub("", json.dumps([spec.id, spec.kwargs], default=repr))),
             "observations": str(env.observation_space),
             "actions": str(env.action_space),
             "settings": [self.most_outcomes, self.runs, self.start_runs, self.seed],
@@ -170,7 +176,7 @@ def _mend(env: gym.Env) -> str:
     )
 
 
-def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int, runs: int) -> Tabulation:
+def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int) -> Tabulation:
     """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
     space = env.observation_space
     only_ends = [key for key in explored.ends if key not in explored.ids]
@@ -195,10 +201,10 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int, ru
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, compared, len(copies), runs))
+    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, compared, len(copies)))
 
 
-def _evidence(explored: Explored, compared: int, split: int, runs: int) -> Evidence:
+def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
     counted = explored.counted["rows"]
     method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
     if not counted:
@@ -206,7 +212,7 @@ def _evidence(explored: Explored, compared: int, split: int, runs: int) -> Evide
         return Evidence(method, exact=True, merged=0, split=split, check=None)
     mean_runs = explored.counted["runs"] / counted
     # Hoeffding's inequality, for all counted probabilities at once.
-    error = math.sqrt(math.log(2 * explored.counted["lines"] / 0.05) / (2 * min(runs, mean_runs)))
+    error = math.sqrt(math.log(2 * explored.counted["lines"] / 0.05) / (2 * explored.counted["fewest"]))
     method += (
         f"; {counted:,} steps or resets whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
         f"probabilities within {error:.3f}, all at once, with 95 % confidence."

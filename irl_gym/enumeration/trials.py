@@ -20,7 +20,8 @@ from irl_gym.enumeration.limits import Limits
 from irl_gym.errors import IrlGymError, NotEnumerable, NotTabular
 
 REPLAYED = 50
-"""Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
+"""Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators. So does a draw
+from the generators that NumPy and Python share."""
 MOST_REFUSALS = 5
 """Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
 ROUNDING = 1e-12
@@ -46,7 +47,7 @@ class Outcomes:
 
     all: list[Outcome]
     runs: int
-    """Runs that were counted; 0 where the outcomes were enumerated, or all runs did the same."""
+    """Runs that were counted; 0 where the outcomes were enumerated."""
 
 
 class OutsideRandomness(Exception):
@@ -71,7 +72,9 @@ class Trials:
         self.snapshots = Snapshots(env, self.draws.twin)
         self.snapshots.include(always)
         self.fresh = self.snapshots.take()
-        self._refusals, self._calls = 0, 0
+        self.refusals = 0
+        """Calls so far that could not be enumerated."""
+        self._calls = 0
 
     def reset(self) -> Call:
         """A reset, as a call."""
@@ -101,14 +104,19 @@ class Trials:
         """
         self._calls += 1
         if not self.counting:
+            checked = self._calls <= 2 * REPLAYED or self._calls % REPLAYED == 0
+            before = _shared_generators() if checked else None
             try:
                 found = self._enumerated(call, make)
-                if found is not None:
-                    if self._calls <= 2 * REPLAYED or self._calls % REPLAYED == 0:
-                        self._check(found[-1], call)
-                    return Outcomes(found, 0)
+                if found is not None and checked:
+                    self._check(found[-1], call)
             except NotEnumerable:
-                self._refusals += 1
+                found = None
+                self.refusals += 1
+            if checked and _shared_generators() != before:
+                raise OutsideRandomness
+            if found is not None:
+                return Outcomes(found, 0)
         found = []
         for i in range(runs):
             result = self.again(call, row, (-1, i))
@@ -131,7 +139,7 @@ class Trials:
         while (one := self._called(lambda: next(outcomes, None))) is not None:
             probability, script, result = one
             found.append(Outcome(probability, script, result, make(result)))
-            if self._refusals >= MOST_REFUSALS and probability < 1:
+            if self.refusals >= MOST_REFUSALS and probability < 1:
                 return None
         return found
 
@@ -148,8 +156,23 @@ class Trials:
 
     def _check(self, last: Outcome, call: Call) -> None:
         (observation, reward, terminated), (before, paid, ended) = self.again(call, 0, last.script), last.result
-        if str(observation) != str(before) or terminated != ended or abs(reward - paid) > ROUNDING:
+        if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
             raise OutsideRandomness
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Are two observations the same?"""
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(_same(part, b[name]) for name, part in a.items())
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(_same, a, b))
+    return np.array_equal(np.asarray(a), np.asarray(b))
+
+
+def _shared_generators() -> tuple[Any, ...]:
+    """The state of the generators that NumPy and Python share."""
+    name, keys, *rest = np.random.get_state()  # noqa: NPY002 (theirs, not ours)
+    return random.getstate(), name, np.asarray(keys).tobytes(), *rest
 
 
 @contextmanager

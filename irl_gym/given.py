@@ -1,0 +1,100 @@
+"""An expert that is given as a file: SB3's zip of an agent, or an npz of a table's actions, as runs leave them."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+
+from irl_gym.errors import DatasetMismatch, InvalidParameter, NotTabular
+from irl_gym.experts import load_expert
+from irl_gym.planners import Agent, Progress
+from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.tabular_vec_env import TabularVecEnv
+
+
+@dataclass(frozen=True)
+class FromFile:
+    """A planner that plans nothing: its policy is in a file. An agent's zip can run code when loaded: trust it first.
+
+    Raises:
+        InvalidParameter: no such file, or another than the digest says.
+    """
+
+    path: str
+    """SB3's zip, or an npz with `actions` or `probabilities`."""
+    sha256: str | None = None
+    """Of the file, so that a run knows it again; `FromFile.at` fills it in."""
+
+    def __post_init__(self) -> None:
+        if not Path(self.path).is_file():
+            raise InvalidParameter(f"expert is {self.path!r}, which is no file: expected SB3's zip, or an npz of actions.")
+        if self.sha256 is not None and self.sha256 != _digest(self.path):
+            raise InvalidParameter(f"{self.path} is not the file that it was (sha256 {self.sha256[:8]}...): expected the same.")
+
+    @classmethod
+    def at(cls, path: str) -> "FromFile":
+        """The expert in a file, with the file's digest."""
+        return cls(path, _digest(path) if Path(path).is_file() else None)
+
+    def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Policy:
+        """The policy in the file.
+
+        Raises:
+            DatasetMismatch: an agent of another environment.
+            InvalidPolicy: a table of another size.
+            NotTabular: a table of actions, where there is no table.
+        """
+        found = load_expert(self.path)
+        if isinstance(found, Agent):
+            return _fitting(found, env)
+        if not isinstance(env, TabularVecEnv) or env.states is None:
+            raise NotTabular(f"{self.path} holds a table of actions: expected an agent's zip, since there is no table here.")
+        unknown = (
+            np.isnan(found).any(axis=1) if found.ndim == 2 and found.dtype.kind == "f" else np.zeros(len(found), dtype=bool)
+        )
+        if unknown.any():
+            raise InvalidParameter(
+                f"{self.path} says nothing of {int(unknown.sum())} states, such as {int(np.argmax(unknown))}: expected actions "
+                "in all. An expert read from a dataset cannot act; give the dataset."
+            )
+        return TabularPolicy(as_distribution(found, env.table.n_states, env.table.n_actions), env.states, seed)
+
+
+def _digest(path: str) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def _fitting(agent: Agent, env: gym.Env | VecEnv) -> Agent:
+    """The agent, which sees rows if it was trained on them."""
+    if isinstance(env, TabularVecEnv) and env.states is not None:
+        if env.shows_rows and agent.model.observation_space == env.observation_space:
+            return Agent(agent.model, env.states)
+        check_agent(agent, env.states.space, env.action_space)
+    else:
+        check_agent(agent, env.observation_space, env.action_space)
+    return agent
+
+
+def check_agent(agent: Agent, observations: Any, actions: spaces.Space) -> None:
+    """Check that an agent can act in an environment of these spaces.
+
+    Raises:
+        DatasetMismatch: it was trained on other observations or actions.
+    """
+    found, taken = agent.model.observation_space, agent.model.action_space
+    fits = taken == actions and (found == observations or not isinstance(observations, spaces.Discrete))
+    try:
+        if fits and found != observations:  # SB3 turns pictures, so spaces that differ may fit
+            agent.predict(observations.sample(), deterministic=True)
+    except (ValueError, TypeError, KeyError, AttributeError, RuntimeError):
+        fits = False
+    if not fits:
+        raise DatasetMismatch(
+            f"the expert is an agent for observations {found} and actions {taken}: expected {observations} and {actions}, the "
+            "environment's. Is it another environment's?"
+        )

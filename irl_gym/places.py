@@ -1,0 +1,70 @@
+"""Where an experiment takes place: a table, exact or of cells; else the environment, which is stepped."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from gymnasium import spaces
+
+from irl_gym.discretize import discretize
+from irl_gym.enumeration.table import Enumeration
+from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.experiment import Experiment
+from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.table_files import UNDER_WAY, kept_table
+from irl_gym.tabulate import tabulate
+from irl_gym.tabulation import Tabulation
+from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
+
+
+def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> TableWorld | SteppedWorld:
+    """The world of an experiment.
+
+    Args:
+        asked: the experiment.
+        env: its environment.
+        out: folder of the run, where a table may be kept, or an enumeration that was killed.
+        tell: told the share of the table that is made.
+
+    Raises:
+        InvalidParameter: cells asked for where states are discrete.
+        NotTabular, NotDiscrete: no table can be made, and the learner needs one.
+    """
+    seed = asked.seed
+    limit = step_limit(env) if asked.dataset is not None else None
+    if asked.bins is not None and isinstance(env.observation_space, spaces.Discrete):
+        raise InvalidParameter(
+            f"bins is {asked.bins}, but {asked.env_id} has discrete states: expected continuous ones. Leave bins out."
+        )
+    if asked.bins is not None:
+        method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
+        table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
+        return TableWorld(env, table, asked.num_envs or 64, seed, limit)
+    try:
+        return TableWorld(env, _table(asked, env, out, tell), asked.num_envs or 64, seed, limit)
+    except (NotTabular, NotDiscrete) as error:
+        if not isinstance(env.action_space, spaces.Discrete):
+            raise
+        if not isinstance(asked.learner, TrajectoryLP):
+            how = "For cells give bins; or learn" if "floats" in str(error) else "Or learn"
+            raise type(error)(
+                f"{asked.env_id or asked.dataset} has no table: {error} {how} from episodes alone, with TrajectoryLP "
+                "(--learner trajectory-lp)."
+            ) from error
+        world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
+        for name in ("expert", "inner", "retrain"):
+            world.check(name, getattr(asked, name))
+        return world
+
+
+def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> Tabulation:
+    """The table that an earlier start kept, or a new one; an enumeration that was killed is continued."""
+    kept = kept_table(out, env.observation_space)
+    if kept is not None:
+        return kept
+    by = asked.table or Enumeration(known=True)
+    if isinstance(by, Enumeration):
+        by = replace(by, checkpoint=out / UNDER_WAY)
+    return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))

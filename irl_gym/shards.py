@@ -1,0 +1,109 @@
+"""Episodes kept in a folder, a closed file for some at a time, so that what is written is never lost.
+
+A shard is an npz of columns, all its episodes one after the other: lengths, ends, seeds, actions, rewards, and the parts of the
+observations. It is written beside its place and renamed; a shard that cannot be read is dropped with those after it.
+Axes: T steps, N episodes of a shard, M = sum of T.
+"""
+
+import zipfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.demonstrations import Episode
+
+SHARD_BYTES = 4 << 20
+"""Of episodes, about: as many are held in memory at a time."""
+NO_SEED = -1
+
+
+class Shards:
+    """The episodes of a folder, in order.
+
+    Args:
+        folder: made with the first shard; what an earlier process left is kept.
+        space: of the observations.
+    """
+
+    def __init__(self, folder: Path, space: spaces.Space):
+        self.folder, self.space = folder, space
+        self.n_episodes, self.n_steps = 0, 0
+        self._n_shards = 0
+        while (lengths := _lengths(self._path(self._n_shards))) is not None:
+            self._n_shards += 1
+            self.n_episodes, self.n_steps = self.n_episodes + lengths.size, self.n_steps + int(lengths.sum())
+        for path in set(folder.glob("*.npz")) - set(map(self._path, range(self._n_shards))):
+            path.unlink()
+
+    def _path(self, number: int) -> Path:
+        return self.folder / f"{number:06}.npz"
+
+    def append(self, episodes: Sequence[Episode]) -> None:
+        """Write some episodes; none for none."""
+        if not episodes:
+            return
+        columns = {
+            "lengths": np.array([len(one) for one in episodes]),
+            "terminated": np.array([one.terminated for one in episodes]),
+            "truncated": np.array([one.truncated for one in episodes]),
+            "seeds": np.array([NO_SEED if one.seed is None else one.seed for one in episodes]),
+            "actions": np.concatenate([one.actions for one in episodes]),
+            "rewards": np.concatenate([np.asarray(one.rewards, dtype=np.float64) for one in episodes]),
+        }
+        parts = [dict(_parts(self.space, one.observations)) for one in episodes]
+        columns.update({name: np.concatenate([one[name] for one in parts]) for name in parts[0]})
+        self.folder.mkdir(exist_ok=True)
+        beside = self.folder / ".tmp.npz"
+        np.savez(beside, **columns)
+        beside.replace(self._path(self._n_shards))
+        self._n_shards += 1
+        self.n_episodes, self.n_steps = self.n_episodes + len(episodes), self.n_steps + int(columns["lengths"].sum())
+
+    def __iter__(self) -> Iterator[Episode]:
+        for number in range(self._n_shards):
+            with np.load(self._path(number), allow_pickle=False) as archive:
+                columns = {name: archive[name] for name in archive.files}
+            step = 0
+            for i, length in enumerate(columns["lengths"].tolist()):
+                steps, seen = slice(step, step + length), slice(step + i, step + i + length + 1)
+                seed = int(columns["seeds"][i])
+                yield Episode(
+                    _joined(self.space, columns, seen), columns["actions"][steps], columns["rewards"][steps],
+                    bool(columns["terminated"][i]), bool(columns["truncated"][i]), None if seed == NO_SEED else seed,
+                )  # fmt: skip
+                step += length
+
+
+def size_of(space: spaces.Space, episode: Episode) -> int:
+    """Bytes of an episode."""
+    return 16 * len(episode) + sum(part.nbytes for _, part in _parts(space, episode.observations))
+
+
+def _lengths(path: Path) -> np.ndarray | None:
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # np.load would leave a broken one open
+            return archive["lengths"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _parts(space: Any, observations: Any, name: str = "observations") -> Iterator[tuple[str, np.ndarray]]:
+    """The arrays that stacked observations are made of, each with a name of its own."""
+    if isinstance(space, spaces.Dict | spaces.Tuple):
+        inside: Any = space.items() if isinstance(space, spaces.Dict) else enumerate(space)
+        for i, (key, one) in enumerate(inside):
+            yield from _parts(one, observations[key], f"{name}.{i}")
+    else:
+        yield name, np.asarray(observations)
+
+
+def _joined(space: Any, columns: dict[str, np.ndarray], rows: slice, name: str = "observations") -> Any:
+    """Some rows of the observations that `_parts` took apart."""
+    if isinstance(space, spaces.Dict):
+        return {key: _joined(one, columns, rows, f"{name}.{i}") for i, (key, one) in enumerate(space.items())}
+    if isinstance(space, spaces.Tuple):
+        return tuple(_joined(one, columns, rows, f"{name}.{i}") for i, one in enumerate(space))
+    return columns[name][rows]

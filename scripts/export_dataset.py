@@ -1,0 +1,111 @@
+"""Export episodes of any expert in any environment with discrete actions as a Minari dataset.
+
+A million steps take seconds, in memory that does not grow; an export that was stopped or killed goes on with the same command.
+
+For example:
+    python scripts/export_dataset.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --steps 1000000 --dataset-id lake/best-v0
+    python scripts/export_dataset.py --env-id CartPole-v1 --expert ppo --epsilon 0.1 --dataset-id cart/noisy-v0 --format arrow
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from irl_gym import IrlGymError
+from irl_gym.datasets import described
+from irl_gym.demonstrators import Recording
+from irl_gym.experiment import parse_keywords
+from irl_gym.export import Amount, export_dataset
+from irl_gym.tabulate import make
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Export episodes of any expert in any environment with discrete actions as a Minari dataset."""
+
+    env_id: str
+    """A registered environment; module:id for one of another package."""
+    dataset_id: str
+    """namespace/name-v0; an id that is taken is never overwritten."""
+    env_kwargs: tuple[str, ...] = ()
+    """What the environment is made with: name=value ..., or one json object."""
+    expert: str = "value-iteration"
+    """value-iteration, on the table; ppo, dqn or a2c, trained here; random; or a file: SB3's zip, or an npz of actions."""
+    epsilon: float = 0.0
+    """Probability of a uniformly random action in place of the expert's."""
+    episodes: int | None = None
+    """How many; the default is 1,000, or as many as the steps take."""
+    steps: int | None = None
+    """Stop after the episode in which this number of steps is reached."""
+    max_episode_steps: int | None = None
+    """Truncate longer episodes; the default is the environment's own limit, or 500 where it has none."""
+    total_timesteps: int | None = None
+    """Environment steps that an agent is trained for."""
+    gamma: float = 0.99
+    """Discount that the expert plans or learns with, between 0 and 1."""
+    seed: int = 0
+    """Of everything that is drawn: the same seed gives the same episodes."""
+    format: Literal["hdf5", "arrow"] = "hdf5"
+    """One file; or a folder an episode, which needs the extra `data`."""
+    root: Path | None = None
+    """Minari's root folder; the default is the one in force."""
+
+
+def main(arguments: Arguments) -> int:
+    """Export, and say what there is."""
+    console = Console(soft_wrap=True)
+    bar = Progress(
+        TextColumn("{task.description:9}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
+        console=console, disable=not console.is_terminal,
+    )  # fmt: skip
+    tasks: dict[str, TaskID] = {}
+
+    def show(stage: str, share: float) -> None:
+        if stage not in tasks:
+            tasks[stage] = bar.add_task(stage, total=1.0)
+        bar.update(tasks[stage], completed=share)
+
+    try:
+        amount = Amount(
+            1_000 if arguments.episodes is None and arguments.steps is None else arguments.episodes, arguments.steps
+        )
+        recording = Recording(
+            arguments.expert, arguments.gamma, arguments.epsilon, arguments.seed, arguments.max_episode_steps,
+            arguments.total_timesteps,
+        )  # fmt: skip
+        env = make(arguments.env_id, **parse_keywords(arguments.env_kwargs))
+        metadata = {
+            "algorithm_name": Path(arguments.expert).name,
+            "author": {"irl_gym"}, "author_email": {"none given"}, "code_permalink": "scripts/export_dataset.py of irl_gym",
+            "description": f"Episodes in {arguments.env_id}, gamma {arguments.gamma}, epsilon {arguments.epsilon}, seed "
+            f"{arguments.seed}.",
+        }  # fmt: skip
+        about = described(arguments.dataset_id, env, None, None, arguments.format, metadata)
+        with bar:
+            dataset = export_dataset(
+                lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
+                about, amount, recording.plan(env), root=arguments.root, on_progress=show,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        Console(stderr=True).print("Stopped. The same command continues after the last episodes written.")
+        return 130
+    except IrlGymError as error:
+        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
+        Console(stderr=True, soft_wrap=True).print(text)
+        return 2
+    size = dataset.storage.metadata["dataset_size"]
+    console.print(
+        f"{dataset.id}: {dataset.total_episodes:,} episodes, {dataset.total_steps:,} steps, {size:,.1f} MB, at", end=" "
+    )
+    console.print(Text(str(Path(dataset.storage.data_path).parent)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Arguments, description=__doc__)))

@@ -1,0 +1,118 @@
+"""Play an environment with the keyboard; your episodes become a Minari dataset to learn from.
+
+For example:
+    python scripts/play.py
+    python scripts/play.py --env-id Taxi-v4 --episodes 3 --dataset-id me/taxi-v0 --root data
+    python scripts/play.py --env-id CartPole-v1 --mode window
+    echo ddsssd | python scripts/play.py --env-kwargs is_slippery=false --episodes 1 --root data
+"""
+
+import io
+import os
+import shutil
+import signal
+import sys
+from contextlib import closing
+from dataclasses import dataclass
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
+
+import tyro
+from rich.console import Console
+from rich.text import Text
+
+from irl_gym import IrlGymError
+from irl_gym.experiment import parse_keywords
+from irl_gym.keyboard import controls_of
+from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
+from irl_gym.screens import as_text, draw, terminal_keys, window_keys
+
+ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
+"""Ctrl-C, a kill, a terminal that is closed: nothing that was finished is lost."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What is played, where it is shown, and where it is kept."""
+
+    env_id: str = "FrozenLake-v1"
+    """A registered environment with Discrete actions; module:id for one of another package."""
+    env_kwargs: tuple[str, ...] = ()
+    """What the environment is made with: name=value ..., or one json object."""
+    episodes: int = 5
+    """Episodes to finish; q ends sooner."""
+    dataset_id: str | None = None
+    """namespace/name-v0; the default is named after the environment, in its first free version."""
+    root: str | None = None
+    """Minari's root folder; the default is Minari's own."""
+    mode: Mode = "terminal"
+    """Show it in the terminal, or in a window."""
+    keys: str = ""
+    """Keys of your own, such as "w=3,a=0,space=2": key=action, counted from 0. Press ? to see all."""
+    seed: int = 0
+    """Of the first attempt; each further one has the next."""
+    keep_unfinished: bool = False
+    """Keep the episode that you break off at the end, as a truncated one."""
+
+
+def show(play: Play, turns: list[Turn], mode: Mode) -> None:
+    """Draw turns and print what is said; on a terminal from its top, with the keys below."""
+    if mode == "window":
+        draw(turns)
+        turns = [Turn(None, turn.said) for turn in turns]
+    colours, size = sys.stdout.isatty(), shutil.get_terminal_size()
+    lines = [as_text(turn, size.columns, size.lines - 6, colours=colours) for turn in turns]
+    if colours and sys.stdin.isatty() and any(turn.frame is not None for turn in turns):
+        keys = str(play.controls)
+        lines = ["\x1b[H\x1b[2J" + lines[0], *lines[1:], *(() if keys in lines[-1] else (keys,))]
+    print(*lines, sep="\n\n", flush=True)
+
+
+def play_on(play: Play, mode: Mode) -> None:
+    """Play until the game is over or no more keys come."""
+    show(play, [play.start()], mode)
+    with closing(window_keys() if mode == "window" else terminal_keys()) as keys:
+        for key in keys:
+            show(play, play.press(key), mode)
+            if play.over:
+                return
+
+
+def main(asked: Arguments) -> int:
+    """Play, write what was finished, and say how to learn from it."""
+    code = 0
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no arrows gets question marks
+    try:
+        plain, shown = stage(asked.env_id, parse_keywords(asked.env_kwargs), asked.mode)
+        play = Play(
+            shown, controls_of(plain, asked.keys), asked.episodes, seed=asked.seed, keep_unfinished=asked.keep_unfinished
+        )
+        dataset_id = free_dataset(asked.dataset_id, plain, asked.root)
+        for ending in ENDINGS:
+            signal.signal(ending, signal.default_int_handler)
+        try:
+            play_on(play, asked.mode)
+        except KeyboardInterrupt:
+            code = 130
+        finally:
+            for ending in ENDINGS:  # a second Ctrl-C does not interrupt the writing
+                signal.signal(ending, signal.SIG_IGN)
+            parting = play.stop()
+            if play.episodes:
+                write_played(play, dataset_id, plain, asked.root)
+    except IrlGymError as error:
+        Console(stderr=True, soft_wrap=True).print(Text.assemble((type(error).__name__, "bold red"), f": {error}"))
+        return 2
+    print(*filter(None, (parting,)), sep="\n", end="\n" if parting else "")
+    if not play.episodes:
+        print("No episode was finished, so there is no dataset.")
+        return code or 1
+    returns = ", ".join(f"{episode.total_reward:g}" for episode in play.episodes)
+    print(f"Dataset {dataset_id} is written. Episodes: {len(play.episodes)}. Returns: {returns}. Learn from it with")
+    print(f"    {learn_command(dataset_id, asked.root)}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Arguments, description=__doc__)))

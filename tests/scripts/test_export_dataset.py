@@ -1,0 +1,142 @@
+"""The script as a person runs it, by subprocess, and as a machine stops it."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import minari
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "scripts" / "export_dataset.py"
+ID = "lake/expert-v0"
+LAKE = ("--env-id", "FrozenLake-v1", "--env-kwargs", "map_name=8x8", "--dataset-id", ID)
+
+
+def command(*arguments):
+    return [sys.executable, str(SCRIPT), *arguments]
+
+
+def run(*arguments):
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    def load(root):
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(root))
+        return minari.load_dataset(ID)
+
+    return load
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "arrow"])
+def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
+    made = run(*LAKE, "--episodes", "30", "--format", kind, "--epsilon", "0.1", "--root", str(tmp_path))
+    assert made.returncode == 0 and f"{ID}: 30 episodes" in made.stdout and made.stderr == ""
+    dataset = opened(tmp_path)
+    assert sum(1 for _ in dataset.iterate_episodes()) == 30 and len(dataset.sample_episodes(4)) == 4
+    assert dataset.recover_environment().spec.kwargs == {"map_name": "8x8"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--dataset-id", "no version"), "InvalidParameter: dataset id 'no version' is malformed"),
+        (("--episodes", "0"), "InvalidParameter: episodes is 0"),
+        (("--env-id", "FrozenLaek-v1"), "UnknownEnvironment: environment 'FrozenLaek-v1'"),
+        (("--env-id", "CartPole-v1", "--env-kwargs", "{}"), "Or choose ppo, dqn or a2c"),
+    ],
+)
+def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, arguments, says):
+    made = run(*LAKE, "--root", str(tmp_path), *arguments)
+    assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_taken_id_is_refused(tmp_path):
+    arguments = (*LAKE, "--episodes", "5", "--root", str(tmp_path))
+    assert run(*arguments).returncode == 0
+    again = run(*arguments)
+    assert again.returncode == 2 and f"DatasetExists: dataset '{ID}' exists" in again.stderr
+
+
+def started(arguments, root):
+    """The script, once it has begun to export."""
+    process = subprocess.Popen(
+        command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background is born deaf to it
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while not list(root.glob(".exporting-*/shards/000000.npz")) and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.005)
+    return process
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("hdf5", 0), ("arrow", 1)])
+def test_kills_at_random_moments_leave_the_same_dataset(tmp_path, opened, kind, seed):
+    arguments = (*LAKE, "--episodes", "1500", "--format", kind)
+    straight, killed = tmp_path / "straight", tmp_path / "killed"
+    straight.mkdir(), killed.mkdir()
+    assert run(*arguments, "--root", str(straight)).returncode == 0
+    wait = random.Random(seed)
+    process = started((*arguments, "--root", str(killed)), killed)
+    time.sleep(wait.uniform(0.0, 0.7))
+    process.kill()
+    process.communicate()
+    found = [path for path in killed.rglob("data") if not any(part.startswith(".") for part in path.relative_to(killed).parts)]
+    if not found:
+        assert run(*arguments, "--root", str(killed)).returncode == 0
+    assert [one.name for one in killed.iterdir()] == ["lake"]
+    if kind == "hdf5":
+        files = [root / ID / "data" / "main_data.hdf5" for root in (straight, killed)]
+        assert files[0].read_bytes() == files[1].read_bytes()
+    else:
+        first, second = (opened(root).iterate_episodes() for root in (straight, killed))
+        assert [str(vars(one)) for one in first] == [str(vars(one)) for one in second]
+
+
+def test_another_plan_is_refused_while_one_is_under_way(tmp_path):
+    arguments = (*LAKE, "--steps", "200000", "--root", str(tmp_path))
+    process = started(arguments, tmp_path)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    made = run(*arguments, "--seed", "1")
+    assert made.returncode == 2 and "RunConflict" in made.stderr and "with seed 0: expected that, not 1" in made.stderr
+
+
+def test_an_export_that_is_interrupted_says_how_to_go_on(tmp_path):
+    process = started((*LAKE, "--steps", "300000", "--root", str(tmp_path)), tmp_path)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130 and said.startswith("Stopped. The same command continues")
+
+
+def resident(process):
+    """Megabytes in use."""
+    with open(f"/proc/{process.pid}/status") as file:
+        return next((int(line.split()[1]) / 1000 for line in file if line.startswith("VmRSS")), 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hdf5", "arrow"])
+def test_a_million_steps_take_less_than_a_minute_in_flat_memory(tmp_path, opened, kind):
+    start = time.monotonic()
+    process = started((*LAKE, "--steps", "1000000", "--format", kind, "--root", str(tmp_path)), tmp_path)
+    samples = []
+    while process.poll() is None:
+        samples.append(resident(process))
+        time.sleep(0.05)
+    seconds, used = time.monotonic() - start, [one for one in samples if one]
+    assert process.returncode == 0, process.stderr.read()
+    process.stderr.close()
+    print(f"{kind}: {seconds:.1f} s, {used[0]:.0f} MB at the first shard, {max(used):.0f} MB at most")
+    assert seconds < 60 and max(used) - used[0] < 200
+    assert opened(tmp_path).total_steps >= 1_000_000
+    if kind == "hdf5":
+        with h5py.File(tmp_path / ID / "data" / "main_data.hdf5") as file:
+            assert len(file) == opened(tmp_path).total_episodes

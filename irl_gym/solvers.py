@@ -56,6 +56,16 @@ class Answer:
     iterations: int
     attempts: int
 
+    def to_json(self) -> dict[str, Any]:
+        """What is noted of a program: everything but its objective."""
+        return {
+            "solver": self.solver,
+            "seconds": self.seconds,
+            "iterations": self.iterations,
+            "attempts": self.attempts,
+            "status": self.status.value,
+        }
+
 
 @dataclass(frozen=True)
 class _Solver:

@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
+from irl_gym.checks import checked_number
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
-from irl_gym.solvers import Status
+from irl_gym.solvers import Status, check_solving
 
 
 @runtime_checkable
@@ -63,3 +64,17 @@ class Learner(Protocol):
     def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:
         """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
         ...
+
+
+def check_weighing(learner: Any) -> None:
+    """Check the fields that learners of linear rewards share: penalty, l1, horizon, seed, solver and time_limit.
+
+    Raises:
+        InvalidParameter: one outside its range.
+    """
+    checked_number("penalty", learner.penalty, "a slope of at least 1, such as the paper's 2", least=1)
+    checked_number("l1", learner.l1, "a number of at least 0", least=0)
+    checked_number("seed", learner.seed, "a whole number of at least 0", least=0, whole=True)
+    if learner.horizon is not None:
+        checked_number("horizon", learner.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+    check_solving(learner.solver, learner.time_limit)

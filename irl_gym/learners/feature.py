@@ -28,14 +28,14 @@ from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
 from irl_gym.learners.feature_rows import FeatureRows, chosen_states, completed, rows_of_model, rows_of_table
 from irl_gym.learners.weights import Rows, Weights, best_weights, most_agreement, uniform_margin
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import Policy
-from irl_gym.solvers import SolverName, Status, check_solving
+from irl_gym.solvers import SolverName, Status
 from irl_gym.states import States
 
 EXACT = 1e3
@@ -77,19 +77,14 @@ class FeatureLP:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
-        checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
-        checked_number("l1", self.l1, "a number of at least 0", least=0)
+        check_weighing(self)
         if self.margin_cap is not None and self.margin_cap != "auto":
             checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
         checked_number("samples", self.samples, "a whole number of at least 1", least=1, whole=True)
-        checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
-        if self.horizon is not None:
-            checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
         if isinstance(self.S_0, int | float | str | np.number):
             checked_number("S_0", self.S_0, "a number of at least 1, states, or None for all", least=1, whole=True)
         elif self.S_0 is not None and not float_array("S_0", self.S_0, "states, all of one length", InvalidParameter).size:
             raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")
-        check_solving(self.solver, self.time_limit)
 
     def fit(
         self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None
@@ -263,14 +258,7 @@ class FeatureLP:
         )
 
     def _stats(self, weights: Weights, found: FeatureRows) -> dict[str, Any]:
-        answer = weights.answer
-        program = {
-            "solver": answer.solver,
-            "seconds": answer.seconds,
-            "iterations": answer.iterations,
-            "attempts": answer.attempts,
-        }
-        return {"programs": {"weights": program | {"status": answer.status.value}}, "rows": len(found.rows.groups)}
+        return {"programs": {"weights": weights.answer.to_json()}, "rows": len(found.rows.groups)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -192,14 +192,7 @@ class _Task:
         return Program(self.part, self.comparisons, learner.reward_on, self.counted, solving)
 
     def record(self, name: str, solved: Solved) -> None:
-        answer = solved.answer
-        self.stats["programs"][name] = {
-            "solver": answer.solver,
-            "seconds": answer.seconds,
-            "iterations": answer.iterations,
-            "attempts": answer.attempts,
-            "status": answer.status.value,
-        }
+        self.stats["programs"][name] = solved.answer.to_json()
 
     def lambda_0(self) -> float:
         solved = programs.critical_l1(self.program())

@@ -112,14 +112,7 @@ class PartialTask:
 
     def recorded(self, name: str, found: Found) -> Found:
         """Note what the solver did."""
-        answer = found.answer
-        self.stats["programs"][name] = {
-            "solver": answer.solver,
-            "seconds": answer.seconds,
-            "iterations": answer.iterations,
-            "attempts": answer.attempts,
-            "status": answer.status.value,
-        }
+        self.stats["programs"][name] = found.answer.to_json()
         return found
 
     def lambda_0(self) -> float:

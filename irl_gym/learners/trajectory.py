@@ -27,13 +27,13 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import FeatureMap, as_features, checked_features
 from irl_gym.generative import least_horizon, truncation_bound
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.estimates import Estimate, nearest, usable
 from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
 from irl_gym.learners.weights import Rows, Weights, best_weights, uniform_margin
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
-from irl_gym.solvers import SolverName, Status, check_solving
+from irl_gym.solvers import SolverName, Status
 
 
 @runtime_checkable
@@ -94,16 +94,11 @@ class TrajectoryLP:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
-        checked_number("penalty", self.penalty, "a slope of at least 1, such as the paper's 2", least=1)
-        checked_number("l1", self.l1, "a number of at least 0", least=0)
+        check_weighing(self)
         if self.gap_cap not in (None, "auto"):
             raise InvalidParameter(f"gap_cap is {self.gap_cap!r}: expected 'auto' or None.")
-        checked_number("seed", self.seed, "a whole number of at least 0", least=0, whole=True)
         for name in ("trajectories", "max_rounds", "patience"):
             checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
-        if self.horizon is not None:
-            checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
-        check_solving(self.solver, self.time_limit)
 
     @property
     def phi(self) -> FeatureMap:

@@ -110,7 +110,8 @@ def _table(world: TableWorld) -> dict[str, Any]:
     return {
         "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
-        "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
+        "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "error": evidence.error,
+        "method": evidence.method,
         "check": None if evidence.check is None else dict(vars(evidence.check)),
     }  # fmt: skip
 

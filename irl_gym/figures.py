@@ -16,6 +16,7 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import optimal_actions
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
+from irl_gym.states import StateIndex
 from irl_gym.worlds import SteppedWorld, TableWorld
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ def draw(loop: "Loop", folder: Path) -> None:
 def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
     table = world.table
     mdp, true, learned = table.mdp, table.reward, world.tabular(loop.learned)
-    layout = grid_layout(loop.env, mdp) if table.evidence.exact else None
+    numbered = isinstance(table.states, StateIndex)  # row = cell; not where only some cells are listed
+    layout = grid_layout(loop.env, mdp) if table.evidence.exact and numbered else None
     expert = loop.expert
     if expert.ndim == 2:  # read from data: where nothing is known, random
         known = ~np.isnan(expert).any(axis=1)

@@ -30,8 +30,8 @@ class Evidence:
     """States split into an ordinary row and a terminal copy."""
     check: SelfCheck | None
     """What sampling `env.step` found; None when it was not asked for."""
-    error: float = 0.0
-    """All probabilities of the table are within this of the environment's, with 95 % confidence; 0 where it is exact."""
+    error: float | None = 0.0
+    """All probabilities are within this of the environment's, with 95 % confidence; 0 where exact, None where not known."""
 
 
 @dataclass(frozen=True, eq=False)

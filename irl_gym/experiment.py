@@ -27,7 +27,8 @@ class Experiment:
 
     Raises:
         InvalidDiscount: gamma outside (0, 1).
-        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset; noise outside 0 to 1.
+        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset, or an expert beside a dataset; two
+            ways to make a table; noise outside 0 to 1.
     """
 
     env_id: str | None
@@ -83,6 +84,16 @@ class Experiment:
                 "expected neither. Name env_id, or leave them out."
             )
         checked_epsilon(self.epsilon)
+        if self.dataset is not None and (self.expert is not None or self.epsilon):
+            raise InvalidParameter(
+                f"dataset is {self.dataset!r}, but expert is {self.expert} and epsilon {self.epsilon}: expected the episodes "
+                "as they are. Leave expert and epsilon out."
+            )
+        if self.table is not None and (self.bins is not None or not isinstance(self.table, By)):
+            raise InvalidParameter(
+                f"table is {self.table!r} and bins {self.bins}: expected Enumeration(...) or Interaction(...) for discrete "
+                "states, or bins for continuous ones. Leave one out."
+            )
         checked_number("samples", self.samples, "a whole number of at least 0", least=0, whole=True)
         for name in ("episodes", "num_envs", "eval_episodes"):
             if name != "num_envs" or self.num_envs is not None:

@@ -259,6 +259,6 @@ def checked_members(space: spaces.Space, numbers: np.ndarray) -> np.ndarray:
         values = numbers[wrong[0]].tolist()
         raise UnknownObservation(
             f"observation {values[0] if len(values) == 1 else values} is outside {space}: expected one of its "
-            "members. Was it recorded in another environment?"
+            "members. Is it another environment's, or are the space's bounds wrong?"
         )
     return numbers

@@ -31,6 +31,7 @@ from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
 from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
+from irl_gym.given import FromFile
 from irl_gym.learners.base import IRLResult, Learner
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
@@ -43,7 +44,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
-from irl_gym.table_files import keep_table
+from irl_gym.table_files import TABLE, UNDER_WAY, keep_table
 from irl_gym.worlds import SteppedWorld, TableWorld
 
 STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
@@ -79,8 +80,7 @@ class Loop:
             start_seeds=experiment.start_seeds, reveal=experiment.reveal,
         )  # fmt: skip
         path, config = Path(out), experiment.to_json()
-        if (path / "config.json").exists():  # another run's folder is refused before any work
-            RunFolder(path, config)
+        claim(path, config)
         self.world: TableWorld | SteppedWorld = place_of(
             experiment, self.env, path, lambda share: self.report_progress("table", share)
         )
@@ -158,7 +158,8 @@ class Loop:
             planner = self.experiment.expert or self.world.expert()
             policy = self.world.train(planner, None, self._share("expert", planner))
             self.world.keep(policy, folder, "expert", self.experiment.epsilon)
-            return {"planner": type(planner).__name__, **_steps(policy)}
+            made = {"environment_steps": 0} if isinstance(planner, FromFile) else _steps(policy)
+            return {"planner": type(planner).__name__, **made}
         if self.seen is not None:
             np.savez(folder / "expert.npz", actions=most_frequent(self.seen))
             return {"planner": "most frequent action of the dataset", "states_seen": int(self.seen.visited.sum())}
@@ -252,6 +253,22 @@ class Loop:
         made.mkdir()
         figures.draw(self, made)
         return {}
+
+
+def claim(path: Path, config: dict[str, Any]) -> None:
+    """Refuse a folder of another run before any work, but take over one in which no stage was finished, without its table.
+
+    Raises:
+        RunConflict: it holds another run, or files that are no run at all.
+    """
+    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+        return
+    known = path / "config.json"
+    before = known.read_bytes() if known.exists() else None
+    RunFolder(path, config)
+    if before not in (None, known.read_bytes()):
+        for name in (TABLE, UNDER_WAY):
+            (path / name).unlink(missing_ok=True)
 
 
 def _steps(policy: Policy) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """Where an experiment takes place: a table, exact or of cells; else the environment, which is stepped."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,19 @@ from gymnasium import spaces
 
 from irl_gym.discretize import discretize
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter, NotDiscrete, NotTabular, RunConflict
 from irl_gym.experiment import Experiment
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.table_files import UNDER_WAY, kept_table
 from irl_gym.tabulate import tabulate
 from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
+
+ON_COMMAND_LINE: dict[type[Exception], str] = {
+    HiddenState: "(On the command line: --reveal name=number, --table sample.) ",
+    EnumerationLimit: "(On the command line: --max-states, with --out naming the same folder.) ",
+}
+"""How the mends of errors are asked for there."""
 
 
 def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> TableWorld | SteppedWorld:
@@ -48,7 +55,9 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
         if not isinstance(env.action_space, spaces.Discrete):
             raise
         if not isinstance(asked.learner, TrajectoryLP):
-            how = "For cells give bins; or learn" if "floats" in str(error) else "Or learn"
+            how = (
+                "For cells give bins; or learn" if "floats" in str(error) else f"{ON_COMMAND_LINE.get(type(error), '')}Or learn"
+            )
             raise type(error)(
                 f"{asked.env_id or asked.dataset} has no table: {error} {how} from episodes alone, with TrajectoryLP "
                 "(--learner trajectory-lp)."
@@ -65,6 +74,23 @@ def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], N
     if kept is not None:
         return kept
     by = asked.table or Enumeration(known=True)
-    if isinstance(by, Enumeration):
+    if isinstance(by, Enumeration) and by.checkpoint is None:
         by = replace(by, checkpoint=out / UNDER_WAY)
-    return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))
+    with _room(out):
+        return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))
+
+
+@contextlib.contextmanager
+def _room(out: Path) -> Iterator[None]:
+    """The folder, for an enumeration that is under way; gone afterwards if nothing is in it, as where there is no table."""
+    made = [one for one in (out, *out.parents) if not one.exists()]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunConflict(f"{out} cannot be made ({error}): expected a folder of yours. Choose another --out.") from error
+    try:
+        yield
+    finally:
+        for one in made:
+            with contextlib.suppress(OSError):  # something was written
+                one.rmdir()

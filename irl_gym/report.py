@@ -35,11 +35,26 @@ def _policies(report: Report) -> Table:
         interval = "{:.3f} ({:.3f} to {:.3f})".format(*(row[key] for key in ("mean_return", "return_low", "return_high")))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
         table.add_row(name, f"{row['value']:.4f}", score, interval, *agreement)
-    table.caption = f"value: {_how_valued(report)}. score: random = 0, expert = 1. mean return: undiscounted, sampled."
+    given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
+    errs = " with its errors" if only and not given else ""
+    table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
     if known:
-        table.caption += " agreement: share of states with one of the expert's actions."
+        table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
+    if report.metrics["table"] is not None:
+        table.caption += f"\ntable: {_table(report.metrics['table'])}"
     table.caption_justify = "left"
     return table
+
+
+OPTIMAL, OWN = "an optimal action", "one of the expert's actions"
+
+
+def _table(table: Mapping[str, Any]) -> str:
+    """How big the table is, where it is from, and how far off it can be."""
+    off = table["error"]
+    told = table["exact"] or not off or "confidence" in table["method"]
+    sure = "" if told else f" Probabilities within {off:.2g}, with 95 % confidence."
+    return f"{table['reachable']:,} reachable states, {table['actions']} actions. {table['method']}{sure}"
 
 
 def _how_valued(report: Report) -> str:
@@ -47,8 +62,8 @@ def _how_valued(report: Report) -> str:
     table = report.metrics["table"]
     if table is None:
         return "discounted, from the start, mean of episodes"
-    given = f", of {table['horizon']} steps, the expert's from its episodes" if table["horizon"] is not None else ""
-    where = "exact" if table["exact"] else "exact on a table that is an estimate"
+    given = f", cut after {table['horizon']} steps, the expert's from its episodes" if table["horizon"] is not None else ""
+    where = "exact" if table["exact"] else "computed on a table that is an estimate"
     return f"{where}, discounted, from the start{given}"
 
 
@@ -57,10 +72,12 @@ def _reward(report: Report) -> Table:
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
-    for what, told in _told_of_reward(reward):
+    for what, told in _told_of_reward(reward, report.metrics):
         table.add_row(what, told)
     table.caption = (
-        "worst-tie regret: what the worst policy greedy under the reward loses. " if "worst_tie_regret" in reward else ""
+        "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
+        if "worst_tie_regret" in reward
+        else ""
     ) + _CAPTIONS.get(reward["learner"], "")
     table.caption_justify = "left"
     return table
@@ -76,25 +93,27 @@ _CAPTIONS = {
 }
 
 
-def _told_of_reward(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """What is said of the reward, line by line: what all learners know, then what each one's certificate knows."""
     if not reward["status"].startswith("Optimal"):
         yield "status", reward["status"]
     best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
-    yield "expert optimal under it", best if reward["expert_optimal"] else _why_not(reward)
+    seen = metrics["demonstrations"]["episodes_only"] and "fell_short" not in reward
+    judged = "; judged are the actions most frequent in its episodes" if seen else ""
+    yield "expert optimal under it", f"{best if reward['expert_optimal'] else _why_not(reward)}{judged}"
+    if reward.get("unknown_states"):
+        of_all = f"{reward['unknown_states']:,} of {metrics['table']['reachable']:,}"
+        yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"
     if reward["degenerate"]:
         yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
     if "worst_tie_regret" in reward:
         share = reward["worst_tie_regret_share"]
-        of_range = "" if share is None else f", {share:.2%} of what the expert has over random"
-        yield "worst-tie regret", f"{_zero(reward['worst_tie_regret']):.4g}{of_range}"
+        of_range = "" if share is None else f", {abs(share):.2%} of what the expert has over random"
+        regret = _zero(reward["worst_tie_regret"])
+        yield "worst-tie regret", f"{regret:.4g}{of_range}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )
-
-
-def _told_nothing(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    return iter(())
 
 
 def _zero(value: float) -> float:
@@ -104,7 +123,9 @@ def _zero(value: float) -> float:
 
 def _why_not(reward: Mapping[str, Any]) -> str:
     if "violated_states" in reward:
-        return f"not in {reward['violated_states']:,} state(s), by {reward['worst_violation']:.3g} at most"
+        count = reward["violated_states"]
+        where = "1 state" if count == 1 else f"{count:,} states"
+        return f"not in {where}, where another action is better by {reward['worst_violation']:.3g} at most"
     if "regret" in reward:
         return f"no: the policy planned for it gains {reward['regret']:.3g} +- {reward['regret_error']:.2g} over the expert"
     return "NO: see certificate.json"
@@ -120,9 +141,10 @@ def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if reward["least_l1_norm"] is not None:
         above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
         yield "||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins"
-    if reward["marginless_states"]:
+    ties = reward["marginless_states"] - reward["violated_states"]
+    if ties > 0:
         mend = " Try --margin-cap auto." if cap is None else ""
-        yield "states where it leaves ties", f"{reward['marginless_states']}: the expert has no margin there.{mend}"
+        yield "states where it leaves ties", f"{ties}: the expert has no margin there.{mend}"
     if reward["inseparable_states"]:
         mend = "there an action has the expert's successors. Try --reward-on state-action."
         yield "states it cannot settle", f"{reward['inseparable_states']}: {mend}"

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from irl_gym._typing import Matrix
 from irl_gym.copies.stripped import without_watchers
-from irl_gym.errors import NotTabular, TableMismatch
+from irl_gym.errors import NotTabular, TableMismatch, UnknownObservation
 from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.states import States
 
@@ -74,7 +74,7 @@ def compare_with_steps(
     limit = 20 * mdp.n_states  # a walk that never ends is started again
 
     def begin(**kwargs: Any) -> int:
-        starts.append(states.encode(walker.reset(**kwargs)[0]))
+        starts.append(_row_of(states, walker.reset(**kwargs)[0], terminated=False))
         _check_start(mdp, starts[-1])
         return starts[-1]
 
@@ -82,7 +82,7 @@ def compare_with_steps(
     for i in range(steps):
         a = int(rng.integers(A))
         observation, paid[i], terminated, truncated, _ = walker.step(a + first_action)
-        following = states.encode(observation, terminated=bool(terminated))
+        following = _row_of(states, observation, terminated=bool(terminated))
         seen[i] = row * A + a, following
         _check_transition(mdp, row, a, following, bool(terminated))
         age += 1
@@ -91,6 +91,16 @@ def compare_with_steps(
             row, age = begin(), 0
     _check_rewards(mdp, payments, seen, paid)
     return _chi_square(mdp, seen, np.array(starts))
+
+
+def _row_of(states: States, observation: Any, *, terminated: bool) -> int:
+    try:
+        return states.encode(observation, terminated=terminated)
+    except UnknownObservation as error:
+        raise TableMismatch(
+            f"the environment showed what the table does not hold: {error} Where the table was enumerated, the observation may "
+            "hide part of the state: try more `revisits`."
+        ) from error
 
 
 def _copy_of(env: gym.Env) -> gym.Env:

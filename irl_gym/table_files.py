@@ -87,12 +87,12 @@ def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist: expected a table, as `save_table` writes it.")
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # a broken file is closed too
             found = {name: archive[name] for name in archive.files}
         if str(found["space"]) != str(space):
             raise InvalidMDP(f"{path} holds a table of observations {found['space']}: expected {space}. Is it another one's?")
         return _rebuilt(found, space)
-    except (OSError, KeyError, EOFError, zipfile.BadZipFile, TypeError, ValueError) as error:
+    except (OSError, LookupError, EOFError, zipfile.BadZipFile, TypeError, AttributeError, ValueError) as error:
         if isinstance(error, InvalidMDP):
             raise
         raise InvalidMDP(f"{path} holds no table ({error}): expected what `save_table` writes.") from error

@@ -67,9 +67,11 @@ class TabularVecEnv(VecEnv):
         self.shows_rows = show_rows or states is None
         shown = None if self.shows_rows else states
         space = spaces.Discrete(table.n_states) if shown is None else shown.space
-        if isinstance(space, spaces.Tuple):
+        parts = space.spaces.values() if isinstance(space, spaces.Dict) else ()
+        if isinstance(space, spaces.Tuple) or any(isinstance(part, spaces.Tuple | spaces.Dict) for part in parts):
             raise InvalidParameter(
-                f"the observation space is {space}: Stable-Baselines3 takes no Tuple observations. Use show_rows=True."
+                f"the observation space is {space}: Stable-Baselines3 takes no Tuple observations, and no Dict inside a Dict. "
+                "Use show_rows=True."
             )
         self._observations = None if shown is None else shown.decode_batch(np.arange(table.n_states))
         super().__init__(num_envs, space, spaces.Discrete(table.n_actions))
@@ -176,6 +178,7 @@ class TabularVecEnv(VecEnv):
 
 
 def shows_rows(states: States) -> bool:
-    """Are rows better shown than observations? Yes where these are several integers; not single numbers, and not floats."""
+    """Are rows better shown than observations? Yes, but for numbers from 0, the only ones that SB3 encodes, and floats."""
     space = states.space
-    return not isinstance(space, spaces.Discrete) and not (isinstance(space, spaces.Box) and space.dtype.kind == "f")
+    from_0 = isinstance(space, spaces.Discrete) and space.start == 0
+    return not from_0 and not (isinstance(space, spaces.Box) and space.dtype.kind == "f")

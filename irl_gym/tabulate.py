@@ -129,6 +129,8 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         known = {id.rpartition(":")[2]: id for id in (*gym.registry, *OWN_ENVIRONMENTS)}
         close = [known[match] for match in difflib.get_close_matches(name, known, n=3, cutoff=0.5)]
         offer = f" The closest are {', '.join(close)}." if close else ""
+        if name.startswith(("MiniGrid-", "BabyAI-")):
+            offer = " MiniGrid's tasks are irl_gym_envs:irl_gym/MiniGrid-v0 with env_kwargs such as task=DoorKey-6x6."
         raise UnknownEnvironment(
             f"environment {env_id!r} is not registered: expected an id such as 'FrozenLake-v1'.{offer} An environment of "
             "another package needs its module named first, as in 'irl_gym_envs:irl_gym/GridWorld-v0'."

@@ -33,6 +33,16 @@ class Evidence:
     error: float | None = 0.0
     """All probabilities are within this of the environment's, with 95 % confidence; 0 where exact, None where not known."""
 
+    def __str__(self) -> str:
+        """The evidence in a few lines a person reads."""
+        off = "by an amount that is not known" if self.error is None else f"by {self.error:.2g} at most, with 95 % confidence"
+        lines = [self.method, "exact                    yes" if self.exact else f"exact                    no, off {off}"]
+        lines.append(f"ends that are states too {self.split}")
+        if self.check is not None:
+            seen = f"{self.check.steps:,} steps, {self.check.rows_seen:,} of {self.check.rows_total:,} pairs (s, a)"
+            lines.append(f"checked against env.step {seen}, no contradiction; p = {self.check.p_value:.2g}")
+        return "\n".join(lines)
+
 
 @dataclass(frozen=True, eq=False)
 class Tabulation:

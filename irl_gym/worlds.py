@@ -5,7 +5,7 @@ Both train agents, run episodes and judge policies, in the same words. On a tabl
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +108,7 @@ class TableWorld:
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes: from the table where it is exact and holds every reward, else by stepping the environment."""
         table, limit = self.table, step_limit(self.env)
-        if table.payments.entries is not None:
+        if table.evidence.exact and table.payments.entries is not None:
             drawn = collect_from_table(
                 table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=limit
             )
@@ -201,7 +201,9 @@ class SteppedWorld:
         return Noisy(agent, made["epsilon"], int(space.n), self.seed) if made["epsilon"] else agent
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
-        """Episodes of a policy, deterministic but for the random one."""
+        """Episodes of a policy, deterministic but for the random one and for noise, which is drawn anew from the seed."""
+        if isinstance(policy, Noisy):  # else it would depend on the episodes before, and so on where a run was continued
+            policy = replace(policy, seed=seed)
         return run_episodes(self.env, policy, n, seed=seed, most=step_limit(self.env))
 
     def value(self, policy: Any) -> float:

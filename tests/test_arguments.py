@@ -1,13 +1,17 @@
 """Each argument of the command line reaches the experiment that it stands for."""
 
+import hashlib
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 from irl_gym.arguments import Arguments
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.counting import Interaction
 from irl_gym.datasets import write_minari
 from irl_gym.demonstrations import Episode
+from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import DatasetMissing, InvalidFeatures, InvalidParameter
 from irl_gym.features import OneHot, Unravel
 from irl_gym.learners.feature import FeatureLP
@@ -53,6 +57,20 @@ def test_nothing_asked_for_is_the_finite_lp_on_frozen_lake():
         ({"retrain": "ppo", "shaping": False}, "retrain", SB3()),
         ({"retrain": "ppo", "total_timesteps": 99}, "retrain", SB3("PPO", 99, FOR_ADVANTAGES)),
         ({"seed": 5}, "seed", 5),
+        ({}, "start_seeds", ()),
+        ({"start_seeds": (0, 7)}, "start_seeds", (0, 7)),
+        ({}, "reveal", "known"),
+        ({"reveal": ("none",)}, "reveal", {}),
+        ({"reveal": ()}, "reveal", {}),
+        ({"reveal": ("step_count=100", "key=2")}, "reveal", {"step_count": 100, "key": 2}),
+        ({}, "table", None),
+        ({"table": "enumerate"}, "table", Enumeration()),
+        ({"table": "sample", "seed": 5}, "table", Interaction(seed=5)),
+        ({"table": "sample", "steps": 99}, "table", Interaction(99)),
+        ({"max_states": 9}, "table", Enumeration(known=True, max_states=9)),
+        ({"table": "enumerate", "max_states": 9}, "table", Enumeration(max_states=9)),
+        ({}, "epsilon", 0.0),
+        ({"epsilon": 0.1}, "epsilon", 0.1),
     ],
 )
 def test_an_argument_reaches_the_experiment(arguments, field, expected):
@@ -68,6 +86,11 @@ def test_an_argument_reaches_the_experiment(arguments, field, expected):
         ({"margin_cap": "auto"}, "margin_cap", "auto"),
         ({"margin_cap": "none"}, "margin_cap", None),
         ({"reward_on": "state-action"}, "reward_on", "state-action"),
+        ({}, "slack", None),
+        ({"epsilon": 0.1}, "slack", 1.0),
+        ({"epsilon": 0.1, "slack": "none"}, "slack", None),
+        ({"epsilon": 0.1, "reward_on": "state-action"}, "slack", None),
+        ({"slack": 2.5}, "slack", 2.5),
         ({"learner": "feature-lp", "l1": 0.5}, "l1", 0.5),
         ({"learner": "feature-lp", "margin_cap": 0.1}, "margin_cap", 0.1),
         ({"learner": "feature-lp"}, "margin_cap", "auto"),
@@ -114,6 +137,20 @@ def test_coordinates_unravel_integers():
     assert learner(learner="feature-lp", env_id="Taxi-v4", coordinates=(5, 5, 5, 4)).phi.coordinates == Unravel((5, 5, 5, 4))
 
 
+@pytest.mark.parametrize("file", ["expert.npz", "agent.zip", "without_suffix"])
+def test_an_expert_may_be_a_file(tmp_path, file):
+    (tmp_path / file).write_bytes(b"anything")
+    one = asked(expert=str(tmp_path / file)).expert
+    assert one.path == str(tmp_path / file) and one.sha256 == hashlib.sha256(b"anything").hexdigest()
+
+
+def test_an_experts_file_is_known_by_its_content(tmp_path):
+    (tmp_path / "agent.zip").write_bytes(b"one")
+    first = asked(expert=str(tmp_path / "agent.zip"))
+    (tmp_path / "agent.zip").write_bytes(b"two")
+    assert asked(expert=str(tmp_path / "agent.zip")).name != first.name
+
+
 # --- environments that are stepped ---
 
 
@@ -145,9 +182,13 @@ def test_a_dataset_names_its_environment(dataset, name):
     assert (one.env_id, one.dataset, one.dataset_root) == (None, *dataset.values()) and one.learner.phi.n_features == 64
 
 
-def test_a_dataset_is_refused_by_the_finite_lp(dataset):
-    with pytest.raises(InvalidParameter, match="Use FeatureLP or TrajectoryLP"):
-        asked(**dataset)
+@pytest.mark.parametrize(
+    ("arguments", "slack"),
+    [({}, 1.0), ({"slack": "none"}, None), ({"slack": 3.0}, 3.0), ({"reward_on": "state-action"}, None)],
+)
+def test_the_finite_lp_learns_from_a_dataset_with_slack_for_errors(dataset, arguments, slack):
+    one = asked(**dataset, **arguments)
+    assert (one.env_id, one.dataset, one.learner.slack) == (None, dataset["dataset"], slack)
 
 
 def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(dataset):
@@ -174,6 +215,25 @@ def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(dataset)
         ({"total_timesteps": 0}, InvalidParameter, "total_timesteps is 0"),
         ({"env_kwargs": ("8x8",)}, InvalidParameter, "env-kwargs"),
         ({"samples": -1}, InvalidParameter, "samples is -1"),
+        ({"expert": "pppo"}, InvalidParameter, "expert is 'pppo': expected one of value-iteration, ppo, dqn, a2c, or a file"),
+        ({"expert": "gone.npz"}, InvalidParameter, "'gone.npz', which is no file"),
+        ({"expert": "."}, InvalidParameter, "'.', which is no file"),
+        ({"reveal": ("key",)}, InvalidParameter, "reveal has 'key': expected name=number"),
+        ({"reveal": ("key=two",)}, InvalidParameter, "reveal has 'key=two'"),
+        ({"reveal": ("key=-2",)}, InvalidParameter, "reveal has 'key=-2'"),
+        ({"reveal": ("known", "key=2")}, InvalidParameter, "reveal has 'known'"),
+        ({"start_seeds": (-1,), "learner": "feature-lp"}, InvalidParameter, "-1"),
+        ({"epsilon": 1.5}, InvalidParameter, "epsilon is 1.5"),
+        ({"slack": 0.5}, InvalidParameter, "slack is 0.5: expected a price of at least 1"),
+        ({"slack": 1.0, "reward_on": "state-action"}, InvalidParameter, "slack is 1.0: expected None"),
+        ({"table": "sample", "steps": 0}, InvalidParameter, "steps is 0"),
+        ({"steps": 9}, InvalidParameter, "steps is 9, but table is 'auto'"),
+        ({"table": "enumerate", "steps": 9}, InvalidParameter, "expected --table sample"),
+        ({"table": "sample", "max_states": 9}, InvalidParameter, "expected --steps"),
+        ({"max_states": 0}, InvalidParameter, "max_states is 0"),
+        ({"table": "sample", "bins": (9,), **CAR}, InvalidParameter, "Leave one out"),
+        ({"dataset": "some/lake-v0", "epsilon": 0.1}, InvalidParameter, "Leave expert and epsilon out"),
+        ({"dataset": "some/lake-v0", "expert": "ppo"}, InvalidParameter, "Leave expert and epsilon out"),
     ],
 )
 def test_a_mistake_is_refused(arguments, error, match, unchecked):

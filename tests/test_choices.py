@@ -9,9 +9,10 @@ from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.choices import MOST_FEATURES, environment_of, features_named, planner_named, steps_only
 from irl_gym.datasets import write_minari
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import DatasetMismatch, DatasetMissing, InvalidFeatures, UnknownEnvironment
+from irl_gym.errors import DatasetMismatch, DatasetMissing, InvalidFeatures, InvalidParameter, UnknownEnvironment
 from irl_gym.features import OneHot, Unravel
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, ValueIteration
+from irl_gym.reveal import Reveal
 
 CAR = "irl_gym_envs:irl_gym/MountainCar-v0"
 
@@ -37,6 +38,41 @@ def test_environment_of_an_id_offers_the_closest_name():
         environment_of("FrozenLaek-v1", {}, None, None)
 
 
+def test_environment_of_an_id_shows_what_is_known_to_be_hidden():
+    env = environment_of("Taxi-v4", {"fickle_passenger": True})
+    assert isinstance(env, Reveal) and env.shown == {"fickle_step": 2}
+
+
+@pytest.mark.parametrize("reveal", [{}, "known"])
+def test_environment_of_an_id_is_left_as_it_is_when_nothing_is_to_be_shown(reveal):
+    assert not isinstance(environment_of("Taxi-v4", {}, reveal=reveal), Reveal)
+
+
+def test_environment_of_an_id_shows_what_is_asked_for():
+    assert environment_of("Taxi-v4", {}, reveal={"fickle_step": 2}).observation_space["fickle_step"].n == 2
+
+
+def test_environment_of_an_id_draws_its_layouts_from_the_start_seeds():
+    env = environment_of("Taxi-v4", {}, start_seeds=(3, 5))
+    expected = {gym.make("Taxi-v4").reset(seed=seed)[0] for seed in (3, 5)}
+    assert {env.reset(seed=seed)[0] for seed in range(20)} == expected
+
+
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        ({"start_seeds": (-1,)}, "-1.*a whole number"),
+        ({"reveal": {"fickle_stop": 2}}, "no attribute 'fickle_stop'.*fickle_step"),
+        ({"reveal": {"fickle_step": 0}}, "at least 1"),
+        ({"reveal": {"observation": 2}}, "the key of the environment's own"),
+        ({"reveal": {"": 2}}, "has the name ''"),
+    ],
+)
+def test_environment_of_an_id_refuses(wrong, match):
+    with pytest.raises(InvalidParameter, match=match):
+        environment_of("Taxi-v4", {}, **wrong).reset()
+
+
 def one_step(env, observation):
     return Episode(np.array([observation] * 2), np.array([0]), np.zeros(1), False, True)
 
@@ -51,7 +87,7 @@ def test_environment_of_a_dataset_is_the_one_it_was_recorded_in(tmp_path, env_id
 
 def test_environment_of_a_dataset_that_does_not_say_asks_for_an_id(tmp_path):
     write_minari([one_step(None, 0)], "some/data-v0", Shows(spaces.Discrete(2)), root=tmp_path, algorithm="x")
-    with pytest.raises(DatasetMismatch, match=r"does not say where it was recorded.*Name its id"):
+    with pytest.raises(DatasetMismatch, match=r"does not say where it was recorded.*Name one with --env-id"):
         environment_of(None, {}, "some/data-v0", str(tmp_path))
 
 
@@ -60,7 +96,11 @@ def test_environment_of_a_dataset_that_is_missing_is_refused(tmp_path):
         environment_of(None, {}, "some/data-v0", str(tmp_path))
 
 
-@pytest.mark.parametrize(("env_id", "expected"), [("FrozenLake-v1", False), ("CartPole-v1", True), ("Blackjack-v1", True)])
+@pytest.mark.parametrize(
+    ("env_id", "expected"),
+    [("FrozenLake-v1", False), ("CartPole-v1", True), ("Blackjack-v1", False), ("Pendulum-v1", True),
+     ("irl_gym_envs:irl_gym/MiniGrid-v0", False)],
+)  # fmt: skip
 def test_steps_only_are_environments_that_show_coordinates(env_id, expected):
     assert steps_only(gym.make(env_id)) == expected
 
@@ -128,6 +168,11 @@ def test_features_named_have_the_size_asked_for(name, kind, size, expected):
     assert type(phi) is kind and phi.n_features == expected
 
 
+def test_features_named_lie_between_the_bounds_of_several_integers():
+    phi = features_named("radial", Shows(spaces.MultiDiscrete([2, 5], start=[0, 3])), size=3)
+    assert phi.centres.min(axis=0).tolist() == [0, 3] and phi.centres.max(axis=0).tolist() == [1, 7]
+
+
 @pytest.mark.parametrize("d", [1, 2, 3, 4, 8])
 @pytest.mark.parametrize("name", ["radial", "fourier"])
 def test_features_named_are_256_at_most_by_default(name, d):
@@ -159,9 +204,9 @@ def test_features_named_take_the_observations_of_the_environment():
         ("one-hot", spaces.Box(0, 1, (2,)), "integers from 0.*choose radial"),
         ("one-hot", spaces.Discrete(4, start=1), "integers from 0"),
         ("radial", spaces.Discrete(6), "product.*5 5 5 4 for Taxi"),
-        ("auto", spaces.Tuple([spaces.Discrete(2)]), "expected a Box or Discrete"),
+        ("auto", spaces.Tuple([spaces.Discrete(2)]), "expected a Box, Discrete or MultiDiscrete"),
         ("auto", spaces.Dict(a=spaces.Discrete(2)), "Flatten them"),
-        ("radial", spaces.MultiDiscrete([2, 3]), "expected a Box or Discrete"),
+        ("radial", spaces.MultiBinary(4), "expected a Box, Discrete or MultiDiscrete"),
         ("radial", spaces.Box(-np.inf, np.inf, (2,)), "finite bounds|unbounded"),
         ("fourier", spaces.Box(-np.inf, np.inf, (2, 2)), "unbounded"),
     ],

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from irl_gym.bases import Fourier, RadialBasis
+from irl_gym.counting import Counting, Interaction
+from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidDiscount, InvalidParameter
 from irl_gym.experiment import MOST_LISTED, Experiment, parse_keywords
 from irl_gym.features import Functions, OneHot, Table, Unravel
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
-from irl_gym.planners import SB3
+from irl_gym.planners import SB3, ValueIteration
 
 
 def lake(**kwargs):
@@ -73,9 +75,27 @@ def test_neither_environment_nor_dataset_is_refused():
         Experiment(None, 0.99)
 
 
-def test_a_dataset_is_refused_when_the_learner_needs_an_action_in_every_state():
-    with pytest.raises(InvalidParameter, match=r"the learner is FiniteLP.* Use FeatureLP or TrajectoryLP"):
-        Experiment(None, 0.99, dataset="some/data-v0", learner=FiniteLP())
+@pytest.mark.parametrize(("asked", "expected"), [({}, False), ({"epsilon": 0.1}, True), ({"dataset": "some/data-v0"}, True)])
+def test_learners_see_episodes_only_when_the_expert_errs_or_is_a_dataset(asked, expected):
+    assert lake(**asked).from_episodes == expected
+
+
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        ({"epsilon": 1.1}, "epsilon is 1.1: expected a probability"),
+        ({"epsilon": -0.1}, "epsilon is -0.1"),
+        ({"dataset": "some/data-v0", "epsilon": 0.1}, "epsilon 0.1: expected the episodes as they are"),
+        ({"dataset": "some/data-v0", "expert": ValueIteration()}, "Leave expert and epsilon out"),
+        ({"env_id": None, "dataset": "some/data-v0", "start_seeds": (0,)}, "start_seeds is .*Name env_id"),
+        ({"env_id": None, "dataset": "some/data-v0", "reveal": {"a": 2}}, "reveal {'a': 2}.*Name env_id"),
+        ({"table": Interaction(), "bins": 5}, "bins 5.*Leave one out"),
+        ({"table": "sample"}, r"table is 'sample'.*Interaction\(\.\.\.\)"),
+    ],
+)
+def test_an_experiment_that_contradicts_itself_is_refused(wrong, match, unchecked):
+    with pytest.raises(InvalidParameter, match=match):
+        Experiment(**{"env_id": "FrozenLake-v1", "gamma": 0.99, **wrong})
 
 
 def test_a_dataset_names_the_run_when_no_environment_does():
@@ -98,6 +118,8 @@ RADIAL = RadialBasis.grid([0, 0], [1, 1], 20)
         {"learner": TrajectoryLP(RADIAL), "inner": SB3(hyperparameters={"n_steps": 8})},
         {"learner": TrajectoryLP(np.zeros((16, 9))), "bins": (3, 4), "samples": 2},
         {"learner": FeatureLP(Functions(np.atleast_2d, 2))},
+        {"learner": FiniteLP(slack=2.0), "table": Enumeration(max_states=9), "start_seeds": (0, 1), "reveal": {"a": 2}},
+        {"learner": FiniteLP(), "table": Interaction(77, Counting(prior=0.5)), "epsilon": 0.2},
     ],
 )
 def test_every_experiment_is_json(asked):
@@ -120,6 +142,15 @@ def test_names_differ_when_large_features_do():
     other = large.copy()
     other[-1, -1] = 1
     assert lake(learner=FeatureLP(Table(large))).name != lake(learner=FeatureLP(Table(other))).name
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"start_seeds": (0,)}, {"reveal": {}}, {"table": Interaction()}, {"table": Enumeration()}, {"epsilon": 0.1},
+     {"expert": ValueIteration()}],
+)  # fmt: skip
+def test_names_differ_when_anything_else_does(other):
+    assert lake(**other).name != lake().name
 
 
 def test_names_differ_when_the_learner_does():

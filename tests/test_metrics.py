@@ -30,6 +30,21 @@ def test_policy_value_equals_the_explicit_inverse(model):
     assert found == pytest.approx(dense_value(model, model.expert))
 
 
+@pytest.mark.parametrize("horizon", [1, 2, 7])
+def test_policy_value_of_some_steps_equals_the_sum_over_them(horizon):
+    model = models.random_model(1, kind="terminal")
+    P_pi = model.P[np.arange(7), model.expert]
+    powers = [np.linalg.matrix_power(0.9 * P_pi, t) for t in range(horizon)]
+    expected = model.mdp.d0 @ sum(powers) @ model.step_reward[np.arange(7), model.expert]
+    assert policy_value(model.mdp, TabularReward(model.R), model.expert, horizon) == pytest.approx(expected)
+
+
+def test_policy_value_of_many_steps_is_that_of_all():
+    model = models.random_model(2)
+    reward = TabularReward(model.R)
+    assert policy_value(model.mdp, reward, model.expert, 400) == pytest.approx(policy_value(model.mdp, reward, model.expert))
+
+
 @given(model=models.models())
 def test_random_value_is_at_most_the_expert_s(model):
     reward = TabularReward(model.R)

@@ -12,7 +12,8 @@ from rich.console import Console
 
 from irl_gym.choices import features_named
 from irl_gym.datasets import read_minari, write_minari
-from irl_gym.errors import DatasetMismatch, DatasetMissing, InvalidFeatures, NotDiscrete, NotTabular
+from irl_gym.enumeration.table import Enumeration
+from irl_gym.errors import DatasetMismatch, DatasetMissing, HiddenState, InvalidFeatures, NotDiscrete, NotTabular
 from irl_gym.experiment import Experiment
 from irl_gym.features import OneHot
 from irl_gym.learners.feature import FeatureLP
@@ -190,7 +191,7 @@ COMMON = ("expert optimal under it", "features", "score")
 SAID = {
     "table, features": (*COMMON, "rank", "sample", "margin cap", "worst-tie regret", "exact, discounted"),
     "table, trajectories": (*COMMON, "best round", "distance", "cut after", "noise alone makes about"),
-    "cells, features": (*COMMON, "exact on a table that is an estimate"),
+    "cells, features": (*COMMON, "computed on a table that is an estimate"),
     "steps, trajectories": (*COMMON, "mean of episodes", "best round"),
     "dataset, features": (*COMMON, "the expert's from its episodes"),
 }
@@ -208,12 +209,20 @@ def test_the_report_says(runs, name):
 
 
 @pytest.mark.parametrize(
-    ("env_id", "error", "match"),
-    [("CartPole-v1", NotDiscrete, "TrajectoryLP"), ("Blackjack-v1", NotTabular, "TrajectoryLP")],
+    ("asked", "error", "match"),
+    [
+        (Experiment("CartPole-v1", 0.99, learner=cap_lp()), NotDiscrete, "give bins; or learn .*TrajectoryLP"),
+        (Experiment("Blackjack-v1", 0.99, reveal={}, learner=cap_lp()), NotTabular, r"`Reveal\(env\)`.*TrajectoryLP"),
+        (
+            Experiment("Blackjack-v1", 0.99, reveal={}, table=Enumeration(), learner=cap_lp()),
+            HiddenState,
+            "--reveal .*--table sample.* TrajectoryLP",
+        ),
+    ],
 )
-def test_feature_lp_without_a_table_is_refused_with_its_mend(tmp_path, env_id, error, match):
+def test_feature_lp_without_a_table_is_refused_with_its_mend(tmp_path, asked, error, match):
     with pytest.raises(error, match=match):
-        recover_and_retrain(Experiment(env_id, 0.99, learner=cap_lp()), tmp_path / "run")
+        recover_and_retrain(asked, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

@@ -9,7 +9,8 @@ from models import episodic_model
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from irl_gym import metrics
-from irl_gym.errors import InvalidDiscount, InvalidParameter, NotTabular
+from irl_gym.errors import InvalidDiscount, InvalidParameter, NotTabular, UnknownObservation
+from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TransitionTable
 from irl_gym.planners import SB3, ValueIteration, load_agent, tabular_actions
 from irl_gym.rewards import TabularReward
@@ -50,6 +51,34 @@ def test_value_iteration_uses_the_discount_asked_for():
     vec = TabularVecEnv(TransitionTable(P, np.eye(4)[0]), TabularReward(R), num_envs=1)
     actions = [tabular_actions((p := ValueIteration().plan(vec, gamma=g)), p.states)[0] for g in (0.5, 0.9)]
     assert actions == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("space", "one"),
+    [
+        (spaces.Tuple([spaces.Discrete(2), spaces.Discrete(3)]), (1, 2)),
+        (spaces.Dict(a=spaces.Discrete(2), b=spaces.Discrete(3)), {"a": 1, "b": 2}),
+        (spaces.Box(np.zeros(2, int), np.array([1, 2]), dtype=np.int64), np.array([1, 2])),
+    ],
+)
+def test_an_agent_trained_on_rows_takes_observations_before_and_after_it_is_saved(model, tmp_path, space, one):
+    states = StateIndex(space)
+    env = TabularVecEnv(model.mdp, TabularReward(model.R), num_envs=16, states=states, show_rows=True, seed=0)
+    agent = SB3(total_timesteps=256).plan(env, gamma=0.9)
+    agent.save(tmp_path / "agent.zip")
+    rows, _ = agent.model.predict(np.arange(6), deterministic=True)
+    for acting in (agent, load_agent(tmp_path / "agent.zip", "PPO", states)):
+        assert acting.states is states and np.array_equal(tabular_actions(acting, states), rows)
+        assert acting.predict(one, deterministic=True)[0] == rows[5]
+
+
+def test_an_agent_trained_on_rows_refuses_what_is_no_state(model):
+    numbers = np.array([[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]])
+    states = ListedStates(spaces.MultiDiscrete([9, 9]), numbers)
+    env = TabularVecEnv(model.mdp, TabularReward(model.R), num_envs=16, states=states, show_rows=True, seed=0)
+    agent = SB3(total_timesteps=256).plan(env, gamma=0.9)
+    with pytest.raises(UnknownObservation, match=r"\[8, 8\] is not a state"):
+        agent.predict(np.array([8, 8]))
 
 
 def test_value_iteration_refuses_a_vector_environment_without_table():

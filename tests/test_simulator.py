@@ -203,8 +203,8 @@ def test_value_iteration_says_what_to_do_when_coordinates_have_no_table():
         world.plan(constant(1.0))
 
 
-def test_value_iteration_says_what_to_do_when_an_environment_publishes_no_table():
-    with pytest.raises(NotTabular, match=r"publishes no transition table.*plan with SB3"):
+def test_value_iteration_says_what_to_do_when_an_environment_hides_something():
+    with pytest.raises(NotTabular, match=r"a natural.*`Reveal\(env\)`.*plan with SB3"):
         _ = Simulator(gym.make("Blackjack-v1"), ValueIteration(), GAMMA).known
 
 

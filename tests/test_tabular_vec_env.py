@@ -10,12 +10,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from irl_gym.discretize import discretize
 from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.mdp import TransitionTable
 from irl_gym.rewards import TabularReward
 from irl_gym.states import StateIndex
 from irl_gym.tabular_env import TabularEnv
-from irl_gym.tabular_vec_env import TabularVecEnv
+from irl_gym.tabular_vec_env import TabularVecEnv, shows_rows
 
 LIMIT = 5
 
@@ -130,6 +131,47 @@ def test_states_decode_dictionaries(model):
     env = TabularVecEnv(model.mdp, TabularReward(model.R), num_envs=4, states=states, max_episode_steps=1, seed=0)
     env.reset()
     assert set(env.step(np.zeros(4, dtype=int))[3][0]["terminal_observation"]) == {"a", "b"}
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        spaces.Tuple([spaces.Discrete(2), spaces.Discrete(3)]),
+        spaces.Dict(a=spaces.Tuple([spaces.Discrete(2)]), b=spaces.Discrete(3)),
+        spaces.Dict(a=spaces.Dict(c=spaces.Discrete(2)), b=spaces.Discrete(3)),
+        spaces.Dict(a=spaces.Discrete(2), b=spaces.Discrete(3)),
+        spaces.Box(np.array([0, 1]), np.array([1, 3]), dtype=np.int64),
+        spaces.MultiDiscrete([2, 3]),
+        spaces.Discrete(6, start=2),
+    ],
+)
+def test_rows_are_shown_for_observations_that_sb3_cannot_encode(model, space):
+    states = StateIndex(space)
+    env = TabularVecEnv(
+        model.mdp, TabularReward(model.R), num_envs=4, states=states, show_rows=shows_rows(states), max_episode_steps=1, seed=0
+    )
+    last = env.reset()
+    assert env.observation_space == spaces.Discrete(6) and last.shape == (4,)
+    final = env.step(np.zeros(4, dtype=int))[3][0]["terminal_observation"]
+    assert env.states is states and np.isscalar(final) and 0 <= final < 6
+
+
+def test_observations_are_shown_when_sb3_encodes_them():
+    cells = discretize(gym.make("MountainCar-v0"), gamma=0.9, bins=3).states
+    assert not shows_rows(StateIndex(spaces.Discrete(6))) and not shows_rows(cells)
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        spaces.Tuple([spaces.Discrete(2), spaces.Discrete(3)]),
+        spaces.Dict(a=spaces.Tuple([spaces.Discrete(2)]), b=spaces.Discrete(3)),
+        spaces.Dict(a=spaces.Dict(c=spaces.Discrete(2)), b=spaces.Discrete(3)),
+    ],
+)
+def test_constructor_refuses_to_show_what_sb3_does_not_take(model, space):
+    with pytest.raises(InvalidParameter, match=r"no Tuple.*Use show_rows=True"):
+        TabularVecEnv(model.mdp, TabularReward(model.R), states=StateIndex(space))
 
 
 def test_ppo_learns_on_it_and_sees_episodes(vec):

@@ -1,5 +1,7 @@
 """Worlds train, run and judge policies in the same way, with a table or without."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features import Functions, OneHot
 from irl_gym.linear_reward import LinearReward
 from irl_gym.metrics import policy_value
+from irl_gym.noise import Noisy
 from irl_gym.planners import FOR_CONTROL, SB3, Agent, ValueIteration
+from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder
 from irl_gym.tabulate import tabulate
@@ -102,6 +106,34 @@ def test_table_world_plans_with_settings_that_suit_the_reward(lake, shaped, sett
     assert bool(lake.planner(shaped=shaped).hyperparameters) == settings
 
 
+def test_table_world_runs_the_environment_itself_when_the_table_is_an_estimate():
+    env = gym.make("FrozenLake-v1", is_slippery=False)
+    exact = tabulate(env, gamma=0.9, check_steps=0)
+    wrong = replace(exact, evidence=replace(exact.evidence, exact=False))
+    nowhere = TableWorld(env, replace(wrong, mdp=tabulate(gym.make("FrozenLake-v1"), gamma=0.9, check_steps=0).mdp), 8, 0)
+    right = np.full(16, 2)
+    assert {tuple(one.observations) for one in nowhere.episodes(right, 20, 0)} == {(0, 1, 2, *[3] * 98)}
+
+
+def test_table_world_counts_the_steps_up_to_its_horizon_only(lake):
+    cut = replace(lake, horizon=30)
+    returns = [discounted_mean([one], 0.9) for one in replace(cut, env=limited(30)).episodes(cut.random, 4000, 1)]
+    assert cut.value(cut.random) < lake.value(lake.random)
+    assert abs(np.mean(returns) - cut.value(cut.random)) < 4 * np.std(returns) / np.sqrt(4000)
+
+
+def limited(steps):
+    return gym.make("FrozenLake-v1", max_episode_steps=steps)
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.25])
+def test_table_world_keeps_the_noise_of_an_expert(lake, tmp_path, epsilon):
+    policy = lake.train(ValueIteration(), None)
+    lake.keep(policy, tmp_path, "expert", epsilon)
+    kept = load_actions(tmp_path / "expert.npz")
+    assert np.allclose(as_distribution(kept, 16, 4), (1 - epsilon) * policy.probabilities + epsilon / 4)
+
+
 # --- without ---
 
 
@@ -126,6 +158,16 @@ def test_stepped_world_episodes_end_at_the_time_limit(cart):
 def test_stepped_world_random_episodes_do_not_depend_on_those_before(cart):
     first, second = ([len(one) for one in cart.episodes(cart.random, 40, seed)] for seed in (3, 9_999))
     assert ks_2samp(first, second).pvalue > 0.01
+
+
+def test_stepped_world_keeps_the_noise_of_an_expert_and_draws_it_from_the_seed_of_the_episodes(cart, tmp_path):
+    folder = RunFolder(tmp_path / "run", {})
+    cart.keep(cart.train(SHORT, None), folder.path, "expert", 0.5)
+    first, again = cart.load(folder, "expert"), cart.load(folder, "expert")
+    assert isinstance(first, Noisy) and first.epsilon == 0.5
+    cart.episodes(first, 3, 0)  # as a run that goes on has drawn some, and one that is continued has not
+    assert [len(one) for one in cart.episodes(first, 9, 1)] == [len(one) for one in cart.episodes(again, 9, 1)]
+    assert [len(one) for one in cart.episodes(first, 9, 1)] != [len(one) for one in cart.episodes(first, 9, 2)]
 
 
 @pytest.mark.parametrize("reward", [None, POLE])

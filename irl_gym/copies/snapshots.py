@@ -22,7 +22,7 @@ import numpy as np
 
 from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, Pairs, References, Twin, anew, attributes, slots
 from irl_gym.copies.stripped import SHARED, awaken_generators, duplicate, layers, replace_generators
-from irl_gym.errors import InvalidParameter, NotTabular
+from irl_gym.errors import InvalidParameter, NotEnumerable, NotTabular
 
 SPACES = frozenset({"observation_space", "action_space", "_observation_space", "_action_space"})
 LEFT_OUT = SHARED | SPACES | {"env", "render_mode", "_np_random_seed"}
@@ -87,7 +87,7 @@ class Snapshots:
         if not self._refuses_pickle:
             try:
                 return self._references.dumps(held)
-            except NotTabular:
+            except (NotTabular, NotEnumerable):  # a uniform number that is kept is none to be copied
                 raise
             except Exception:  # whatever a class raises that will not be pickled
                 self._refuses_pickle = True

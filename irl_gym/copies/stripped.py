@@ -95,6 +95,7 @@ def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
             raise
         return _whole(layer, memo)
     memo.update(tried)
+    memo.setdefault(id(memo), []).append(tried)  # deepcopy knows `tried` by its address, which may not be given to another dict
     return made
 
 

@@ -137,7 +137,7 @@ def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dic
         RunConflict: a file of another environment or of other settings, or none that can be read.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # a broken file is closed too
             found = {name: archive[name] for name in archive.files}
         asked = dict(json.loads(str(found["identity"])))
         explored = _rebuilt(found, space, n_actions)

@@ -169,8 +169,8 @@ class Explorer:
             self._newcomers[number].append((number, state, way))
 
     def _compare(self, number: int, newcomer: Any, way: Way) -> None:
-        """Does a state behave the same in another inner state? Counts, which differ by chance, are not compared."""
-        if self.explored.counted["rows"] or self._revisits.get(number, 0) >= self.limits.revisits:
+        """Does a state behave the same in another inner state? Counted steps, which differ by chance, are not compared."""
+        if self._revisits.get(number, 0) >= self.limits.revisits:
             return
         self._revisits[number] = self._revisits.get(number, 0) + 1
         refusals, reached = self.trials.refusals, []

@@ -24,7 +24,7 @@ from irl_gym.copies.stripped import without_watchers
 from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.trials import OutsideRandomness
+from irl_gym.enumeration.trials import OutsideRandomness, called
 from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
@@ -83,6 +83,8 @@ class Enumeration(Limits):
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
         always: frozenset[str] = frozenset()
         counting = False
+        if self.checkpoint is not None and not Path(self.checkpoint).absolute().parent.is_dir():
+            raise InvalidParameter(f"checkpoint is {str(self.checkpoint)!r}: expected a file in a folder that exists. Make it.")
         while True:
             explored = None
             if self.checkpoint is not None and Path(self.checkpoint).exists():
@@ -92,7 +94,7 @@ class Enumeration(Limits):
                 always |= frozenset(explored.always)
             try:
                 own = without_watchers(env)
-                own.reset(seed=self.seed)
+                called(lambda own=own: own.reset(seed=self.seed))
                 explorer = Explorer(own, self, explored, always, counting)
                 explorer.explored.counted["outside"] = int(counting)
                 explorer.explored.always = tuple(sorted(always))
@@ -172,7 +174,8 @@ def _mend(env: gym.Env) -> str:
     shown = f" ({', '.join(known)})" if known else ""
     return (
         f"Show what is hidden{shown} in the observation, with `irl_gym.reveal.{how}`; where it is a reward that depends on "
-        "time, replace the reward; or count what happens on average, with `by=Interaction()`."
+        "time, replace the reward; where it is a continuous state, make cells of it with `discretize`; or count what happens "
+        "on average, with `by=Interaction()`."
     )
 
 
@@ -214,7 +217,7 @@ def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
     # Hoeffding's inequality, for all counted probabilities at once.
     error = math.sqrt(math.log(2 * explored.counted["lines"] / 0.05) / (2 * explored.counted["fewest"]))
     method += (
-        f"; {counted:,} steps or resets whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
+        f"; {counted:,} step(s) or reset(s) whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
         f"probabilities within {error:.3f}, all at once, with 95 % confidence."
     )
     return Evidence(method, exact=False, merged=0, split=split, check=None, error=error)

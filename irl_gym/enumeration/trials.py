@@ -20,8 +20,9 @@ from irl_gym.enumeration.limits import Limits
 from irl_gym.errors import IrlGymError, NotEnumerable, NotTabular
 
 REPLAYED = 50
-"""Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators. So does a draw
-from the generators that NumPy and Python share."""
+"""Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
+SUSPECTED = 25
+"""Times that it is made again where the generators that NumPy and Python share were drawn from, be it by the environment."""
 MOST_REFUSALS = 5
 """Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
 ROUNDING = 1e-12
@@ -69,7 +70,7 @@ class Trials:
         self.env, self.limits, self.counting = env, limits, counting
         self.first_action = int(space.start)
         self.draws = Draws(limits.most_outcomes)
-        self.snapshots = Snapshots(env, self.draws.twin)
+        self.snapshots = called(lambda: Snapshots(env, self.draws.twin))  # which walks about in it
         self.snapshots.include(always)
         self.fresh = self.snapshots.take()
         self.refusals = 0
@@ -108,15 +109,12 @@ class Trials:
             before = _shared_generators() if checked else None
             try:
                 found = self._enumerated(call, make)
-                if found is not None and checked:
-                    self._check(found[-1], call)
+                if found is not None:
+                    if checked:
+                        self._check(found[-1], call, SUSPECTED if _shared_generators() != before else 1)
+                    return Outcomes(found, 0)
             except NotEnumerable:
-                found = None
                 self.refusals += 1
-            if checked and _shared_generators() != before:
-                raise OutsideRandomness
-            if found is not None:
-                return Outcomes(found, 0)
         found = []
         for i in range(runs):
             result = self.again(call, row, (-1, i))
@@ -126,38 +124,46 @@ class Trials:
     def again(self, call: Call, row: int, script: Script) -> Result:
         """The outcome of a script."""
         if script[:1] != (-1,):
-            return self._called(lambda: self.draws.replay(script, call))
+            return called(lambda: self.draws.replay(script, call))
         seed = [self.limits.seed, row + 1, script[1]]
         if not self.counting:
-            return self._called(lambda: self.draws.seeded(seed, call))
+            return called(lambda: self.draws.seeded(seed, call))
         with _seeded_globals(seed):
-            return self._called(lambda: self.draws.seeded(seed, call))
+            return called(lambda: self.draws.seeded(seed, call))
 
     def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
         """All outcomes; None for a random call after others had too many."""
         found, outcomes = [], self.draws.outcomes(call)
-        while (one := self._called(lambda: next(outcomes, None))) is not None:
+        while (one := called(lambda: next(outcomes, None))) is not None:
             probability, script, result = one
             found.append(Outcome(probability, script, result, make(result)))
             if self.refusals >= MOST_REFUSALS and probability < 1:
                 return None
         return found
 
-    def _called(self, run: Callable[[], Any]) -> Any:
-        try:
-            return run()
-        except (IrlGymError, ConstantChanged):
-            raise
-        except Exception as error:
-            raise NotTabular(
-                f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, "
-                "to work. Mend the environment."
-            ) from error
+    def _check(self, last: Outcome, call: Call, times: int) -> None:
+        before, paid, ended = last.result
+        for _ in range(times):
+            observation, reward, terminated = self.again(call, 0, last.script)
+            if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
+                raise OutsideRandomness
 
-    def _check(self, last: Outcome, call: Call) -> None:
-        (observation, reward, terminated), (before, paid, ended) = self.again(call, 0, last.script), last.result
-        if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
-            raise OutsideRandomness
+
+def called(run: Callable[[], Any]) -> Any:
+    """What a call of the environment returns.
+
+    Raises:
+        NotTabular: it raised an error of its own.
+    """
+    try:
+        return run()
+    except (IrlGymError, ConstantChanged):
+        raise
+    except Exception as error:
+        raise NotTabular(
+            f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, to "
+            "work. Mend the environment."
+        ) from error
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -1,5 +1,6 @@
 """The script as a person runs it, by subprocess."""
 
+import json
 import os
 import signal
 import subprocess
@@ -58,12 +59,17 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-kwargs", "{broken"), "InvalidParameter: env-kwargs is '{broken'"),
         (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
         (
-            ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true"),
-            "NotTabular: Taxi-v4 has no table: fickle_passenger",
+            ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--reveal", "none"),
+            "HiddenState: Taxi-v4 has no table: observation",
         ),
+        (("--expert", "pppo"), "InvalidParameter: expert is 'pppo': expected one of value-iteration, ppo"),
+        (("--expert", "agent.zip"), "InvalidParameter: expert is 'agent.zip', which is no file"),
+        (("--reveal", "8"), "InvalidParameter: reveal has '8'"),
+        (("--steps", "9"), "InvalidParameter: steps is 9, but table is 'auto'"),
+        (("--epsilon", "2"), "InvalidParameter: epsilon is 2"),
         (("--env-id", "Pendulum-v1"), "NotDiscrete"),
         (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
-        (("--learner", "feature-lp", "--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
+        (("--dataset", "lake-v0", "--dataset-root", "."), "DatasetMissing: dataset 'lake-v0'"),
         (("--env-id", "CartPole-v1", "--learner", "trajectory-lp", "--features", "one-hot"), "choose radial"),
     ],
 )
@@ -86,9 +92,25 @@ def test_the_report_names_the_best_round_of_trajectories(tmp_path):
 def test_a_dataset_alone_is_learned_from(finished, tmp_path):
     (held,) = sorted((finished[1] / "runs").iterdir())[:1]
     data = ("--dataset", "irl_gym/frozenlake-v1-expert-v0", "--dataset-root", str(held / "dataset"))
-    made = run(*data, "--learner", "feature-lp", "--retrain", "value-iteration", cwd=tmp_path)
+    made = run(*data, "--retrain", "value-iteration", cwd=tmp_path)
     assert made.returncode == 0, made.stderr
-    assert "from its episodes" in " ".join(made.stdout.split())
+    said = " ".join(made.stdout.split())
+    assert all(words in said for words in ("from its episodes", "an optimal action", "table:"))
+
+
+def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs(tmp_path):
+    made = run(
+        "--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--epsilon", "0.2", "--episodes", "60",
+        "--retrain", "value-iteration", cwd=tmp_path,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    said = " ".join(made.stdout.replace("│", " ").split())
+    told = ("expert with its errors = 1", "states where it was not seen", "nothing is asked of its actions", "of 712 states")
+    assert [words for words in told if words not in said] == []
+    (metrics,) = tmp_path.glob("runs/*/metrics.json")
+    found = json.loads(metrics.read_text())
+    assert found["policies"]["retrained"]["score"] > 0.95 and not found["reward"]["expert_optimal"]
+    assert found["reward"]["violated_states"] > 0 < found["reward"]["unknown_states"] and found["reward"]["slack"] == 1.0
 
 
 def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):

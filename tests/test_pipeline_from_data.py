@@ -1,0 +1,170 @@
+"""The loop from a dataset alone with FiniteLP: what it is told of the expert, and values that are cut alike for all."""
+
+import io
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from rich.console import Console
+
+from irl_gym.datasets import read_minari
+from irl_gym.demonstrated import most_frequent
+from irl_gym.demonstrations import empirical_policy
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.errors import DatasetMismatch, InvalidParameter
+from irl_gym.experiment import Experiment
+from irl_gym.given import FromFile
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.loop import Loop
+from irl_gym.metrics import policy_value
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import ValueIteration
+from irl_gym.report import print_report
+from irl_gym.worlds import discounted_mean
+
+DATA = "irl_gym/frozenlake-v1-expert-v0"
+GAMMA, LIMIT = 0.95, 20
+SOFT = FiniteLP(slack=1.0)
+FEW = {"eval_episodes": 400, "retrain": ValueIteration()}
+LAKE = {"map_name": "4x4", "max_episode_steps": LIMIT}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_figures():
+    """They take longer than all else here; other tests draw them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("irl_gym.loop.figures.draw", lambda loop, folder: None)
+        yield
+
+
+def recorded(out, **asked):
+    """A run whose demonstrations the others take; episodes end after 20 steps, so that the cut matters."""
+    return recover_and_retrain(Experiment("FrozenLake-v1", GAMMA, LAKE, **FEW, **asked), out)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("source") / "run", episodes=400)
+
+
+@pytest.fixture(scope="module")
+def noisy(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("noisy") / "run", episodes=30, epsilon=0.3, learner=SOFT)
+
+
+def data_of(report):
+    return {"dataset": DATA, "dataset_root": str(report.out / "dataset")}
+
+
+@pytest.fixture(scope="module")
+def from_data(source, tmp_path_factory):
+    return recover_and_retrain(
+        Experiment(None, GAMMA, learner=SOFT, **data_of(source), **FEW), tmp_path_factory.mktemp("data") / "run"
+    )
+
+
+@pytest.fixture(scope="module")
+def from_noise(noisy, tmp_path_factory):
+    return recover_and_retrain(
+        Experiment(None, GAMMA, learner=SOFT, **data_of(noisy), **FEW), tmp_path_factory.mktemp("noise") / "run"
+    )
+
+
+def episodes_of(report):
+    return list(read_minari(DATA, root=report.out / "dataset"))
+
+
+def test_values_are_cut_at_the_time_limit(from_data, source):
+    assert (from_data.metrics["table"]["horizon"], source.metrics["table"]["horizon"]) == (LIMIT, None)
+
+
+def test_the_experts_value_is_the_mean_of_its_episodes(from_data, source):
+    mean = discounted_mean(episodes_of(source), GAMMA)
+    assert from_data.metrics["policies"]["expert"]["value"] == pytest.approx(mean)
+
+
+@pytest.mark.parametrize("policy", ["random", "retrained"])
+def test_the_values_of_the_others_are_those_of_episodes_cut_as_the_experts_are(from_data, toy_text, policy):
+    table = toy_text("FrozenLake 4x4 slippery")
+    actions = np.load(from_data.out / "agent_policy.npz")["actions"] if policy == "retrained" else np.full((16, 4), 0.25)
+    expected = policy_value(discounted(table.mdp), table.reward, actions, LIMIT)
+    assert from_data.metrics["policies"][policy]["value"] == pytest.approx(expected)
+    env, rng, returns = gym.make("FrozenLake-v1", max_episode_steps=LIMIT), np.random.default_rng(0), []
+    for seed in range(400):
+        at, _ = env.reset(seed=seed)
+        step, done, total = 0, False, 0.0
+        while not done:
+            at, paid, ended, cut, _ = env.step(int(actions[at]) if policy == "retrained" else int(rng.integers(4)))
+            total, step, done = total + GAMMA**step * float(paid), step + 1, ended or cut
+        returns.append(total)
+    assert abs(np.mean(returns) - expected) < 4 * np.std(returns) / np.sqrt(400)
+
+
+def discounted(mdp):
+    return type(mdp)(mdp.P, GAMMA, mdp.d0)
+
+
+def test_the_agent_is_as_good_as_the_best_within_the_noise_of_the_episodes(from_data, toy_text):
+    table = toy_text("FrozenLake 4x4 slippery")
+    mdp = discounted(table.mdp)
+    best = policy_value(mdp, table.reward, policy_iteration(mdp, table.reward).policy, LIMIT)
+    assert from_data.metrics["policies"]["retrained"]["value"] > 0.95 * best
+
+
+def test_the_expert_that_is_kept_is_what_it_did_most(from_noise, noisy, toy_text):
+    kept = np.load(from_noise.out / "expert.npz")["actions"]
+    seen = empirical_policy(episodes_of(noisy), toy_text("FrozenLake 4x4 slippery").states, 4)
+    np.testing.assert_array_equal(kept, most_frequent(seen))
+
+
+def test_the_same_is_learned_from_a_noisy_expert_and_from_its_dataset(from_noise, noisy):
+    assert from_noise.certificate == noisy.certificate
+    assert (from_noise.out / "reward.npz").read_bytes() == (noisy.out / "reward.npz").read_bytes()
+
+
+def test_the_metrics_count_unknown_and_violated_states(from_noise):
+    reward, certificate = from_noise.metrics["reward"], from_noise.certificate
+    for key in ("unknown", "violated", "marginless"):
+        assert reward[f"{key}_states"] == len(certificate[key])
+    assert reward["slack"] == 1.0 and reward["expert_optimal"] == (not certificate["violated"])
+
+
+def test_the_metrics_say_what_was_known_of_the_expert(from_data, source, noisy):
+    told = [(one.metrics["demonstrations"]["given"], one.metrics["demonstrations"]["episodes_only"])
+            for one in (from_data, source, noisy)]  # fmt: skip
+    assert told == [(True, True), (False, False), (False, True)]
+
+
+def test_the_report_of_a_dataset_says_whose_values_are_cut(from_data):
+    console = Console(record=True, width=300, file=io.StringIO())
+    print_report(from_data, console)
+    text = " ".join(console.export_text().split())
+    for words in (f"cut after {LIMIT} steps, the expert's from its episodes", "with an optimal action", "expert = 1"):
+        assert words in text
+
+
+@pytest.mark.parametrize("learner", [FiniteLP(), FiniteLP(reward_on="state-action"), FiniteLP(unvisited="free", l1="auto")])
+def test_every_finite_lp_learns_from_a_dataset(noisy, tmp_path, learner):
+    made = recover_and_retrain(Experiment(None, GAMMA, learner=learner, **data_of(noisy), **FEW), tmp_path / "run")
+    assert made.metrics["reward"]["status"].startswith("Optimal")
+
+
+def test_the_same_seed_gives_the_same_bytes(from_noise, noisy, tmp_path):
+    again = recover_and_retrain(Experiment(None, GAMMA, learner=SOFT, **data_of(noisy), **FEW), tmp_path / "run")
+    for file in ("metrics.json", "certificate.json", "config.json", "reward.npz", "expert.npz"):
+        assert (from_noise.out / file).read_bytes() == (again.out / file).read_bytes(), file
+
+
+def test_an_expert_read_from_a_dataset_cannot_act_where_it_was_not_seen(from_noise, tmp_path):
+    table = np.load(from_noise.out / "expert.npz")["actions"]
+    table[0] = np.nan
+    np.savez(tmp_path / "expert.npz", actions=table)
+    asked = Experiment("FrozenLake-v1", GAMMA, expert=FromFile.at(str(tmp_path / "expert.npz")), **FEW)
+    with pytest.raises(InvalidParameter, match="An expert read from a dataset cannot act; give the dataset"):
+        recover_and_retrain(asked, tmp_path / "run")
+
+
+def test_a_dataset_of_another_environment_is_refused(source, tmp_path):
+    asked = Experiment("FrozenLake-v1", GAMMA, {"map_name": "8x8"}, learner=SOFT, **data_of(source))
+    with pytest.raises(DatasetMismatch, match="8x8"):
+        Loop(asked, tmp_path / "run").stage("expert")

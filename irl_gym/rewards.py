@@ -22,9 +22,10 @@ from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TransitionTable
 
 FORMAT = "irl_gym.TabularReward/1"
-_UNREADABLE = (
+UNREADABLE = (
     ValueError, KeyError, EOFError, TypeError, NotImplementedError, OSError, AttributeError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
+"""What `np.load` and json raise of a file that is damaged, or is something else."""
 
 
 @runtime_checkable
@@ -138,7 +139,7 @@ def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dic
             arrays = {name: archive[name] for name in archive.files if name != "header"}
     except FileNotFoundError:
         raise
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise InvalidReward(f"{path} holds no reward ({error}): expected a file that a reward's `save` wrote.") from error
     if not isinstance(header, dict) or header.get("format") not in formats:
         expected = " or ".join(map(repr, formats))

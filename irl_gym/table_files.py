@@ -5,7 +5,6 @@ The observation space is not kept: who reads the file gives it, and it is compar
 
 import json
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from gymnasium import spaces
 from irl_gym.errors import InvalidMDP
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
-from irl_gym.rewards import TabularReward, plain_json
+from irl_gym.rewards import UNREADABLE, TabularReward, plain_json
 from irl_gym.selfcheck import Payments, SelfCheck
 from irl_gym.states import StateIndex
 from irl_gym.tabulation import Evidence, Tabulation
@@ -92,7 +91,7 @@ def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
         if str(found["space"]) != str(space):
             raise InvalidMDP(f"{path} holds a table of observations {found['space']}: expected {space}. Is it another one's?")
         return _rebuilt(found, space)
-    except (OSError, LookupError, EOFError, zipfile.BadZipFile, TypeError, AttributeError, ValueError) as error:
+    except (*UNREADABLE, LookupError) as error:
         if isinstance(error, InvalidMDP):
             raise
         raise InvalidMDP(f"{path} holds no table ({error}): expected what `save_table` writes.") from error

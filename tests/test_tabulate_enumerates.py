@@ -95,7 +95,7 @@ class Cells(gym.ObservationWrapper):
         self.observation_space = spaces.MultiDiscrete([20, 20])
 
     def observation(self, observation):
-        return np.clip((observation + [1.2, 0.07]) / [1.8, 0.14] * 20, 0, 19).astype(np.int64)
+        return np.clip((observation + np.array([1.2, 0.07])) / [1.8, 0.14] * 20, 0, 19).astype(np.int64)
 
 
 def test_tabulate_finds_the_continuous_state_that_cells_hide_though_starts_are_counted():

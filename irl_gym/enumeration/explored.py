@@ -9,7 +9,6 @@ Axes: n states, e ends, m lines; a line is a successor of a pair (state, action)
 
 import json
 import os
-import zipfile
 from array import array
 from collections.abc import Hashable
 from pathlib import Path
@@ -20,6 +19,7 @@ from gymnasium import spaces
 
 from irl_gym.errors import RunConflict
 from irl_gym.integer_spaces import keys_of_numbers, numbers_of_keys
+from irl_gym.rewards import UNREADABLE
 
 Script = tuple[int, ...]
 """Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
@@ -141,7 +141,7 @@ def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dic
             found = {name: archive[name] for name in archive.files}
         asked = dict(json.loads(str(found["identity"])))
         explored = _rebuilt(found, space, n_actions)
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+    except (*UNREADABLE, LookupError) as error:
         raise RunConflict(
             f"{path} holds no enumeration ({error}): expected one to continue. Remove it to begin anew."
         ) from error

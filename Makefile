@@ -30,11 +30,13 @@ wheel: $(READY)
 	$(BIN)/python -m build --wheel --outdir dist . > /dev/null
 	$(BIN)/check-wheel-contents dist
 
-bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment, the paper (about 20 minutes)
+bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment, the paper (about an hour)
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
 	$(BIN)/python scripts/measure_learners.py
+	$(BIN)/python scripts/measure_environments.py
+	$(BIN)/python scripts/measure_demonstrations.py
 	$(BIN)/python scripts/reproduce_ng_russell.py
 
 # torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.

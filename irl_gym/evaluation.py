@@ -94,6 +94,7 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
             told[key] = value
     world = loop.world
     if isinstance(world, TableWorld):
+        told["reward_on"] = "state" if world.tabular(loop.learned).on_states else "state-action"
         worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
         value = worst.value if world.horizon is None else world.value(worst.policy)
         share = (expert - value) / (expert - random) if expert != random else float("nan")

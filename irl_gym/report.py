@@ -8,6 +8,9 @@ from rich.table import Table
 
 from irl_gym.pipeline import Report
 
+MUCH = 0.05
+"""Share of the expert's advantage over random; a worst tie that loses more is worth a warning."""
+
 
 def print_report(report: Report, console: Console) -> None:
     """Print what a run found."""
@@ -110,7 +113,9 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
         share = reward["worst_tie_regret_share"]
         of_range = "" if share is None else f", {abs(share):.2%} of what the expert has over random"
         regret = _zero(reward["worst_tie_regret"])
-        yield "worst-tie regret", f"{regret:.4g}{of_range}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
+        beware = "; how an agent breaks ties decides what it earns" if share is not None and share > MUCH else ""
+        lost = f"{regret:.4g}{of_range}{beware}"
+        yield "worst-tie regret", lost if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )
@@ -143,7 +148,8 @@ def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins"
     ties = reward["marginless_states"] - reward["violated_states"]
     if ties > 0:
-        mend = " Try --margin-cap auto." if cap is None else ""
+        on_states = reward.get("reward_on") == "state"
+        mend = " Try --margin-cap auto." if cap is None else " Try --reward-on state-action." if on_states else ""
         yield "states where it leaves ties", f"{ties}: the expert has no margin there.{mend}"
     if reward["inseparable_states"]:
         mend = "there an action has the expert's successors. Try --reward-on state-action."

@@ -15,7 +15,7 @@ from irl_gym._typing import ActionSets
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular
 from irl_gym.policies import support
-from irl_gym.worlds import TableWorld, discounted_mean
+from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
     from irl_gym.loop import Loop
@@ -28,19 +28,20 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
     """Judge the expert, a random policy, the retrained agent and the recovered reward."""
     experiment, world = loop.experiment, loop.world
     random = world.value(world.random)
-    expert = discounted_mean(loop.demonstrations, world.gamma) if from_data(loop) else world.value(loop.expert)
+    earned = _earned(loop) if from_data(loop) else np.zeros((0, 2))
+    expert = float(earned[:, 0].mean()) if from_data(loop) else world.value(loop.expert)
     rows = {}
     for number, (name, policy) in enumerate({"expert": loop.expert, "random": world.random, "retrained": loop.agent}.items()):
         told = name == "expert" and from_data(loop)
         seed = experiment.seed + 1_000_003 * (number + 1)
-        episodes = loop.demonstrations if told else world.episodes(policy, experiment.eval_episodes, seed)
-        returns = np.array([episode.total_reward for episode in episodes])
+        episodes = [] if told else world.episodes(policy, experiment.eval_episodes, seed)
+        returns = earned[:, 1] if told else np.array([episode.total_reward for episode in episodes])
         mean, low, high = metrics.mean_interval(returns, rng=np.random.default_rng(experiment.seed))
         value = {"expert": expert, "random": random}.get(name)
         value = world.value(policy) if value is None else value
         rows[name] = {
             "value": value,
-            "score": _plain(metrics.normalised_score(value, random, expert)),
+            "score": _score(value, random, expert),
             "mean_return": mean,
             "return_low": low,
             "return_high": high,
@@ -54,6 +55,26 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
     }
     shown = {"policies": rows, "reward": _reward(loop, random, expert), "training": training}
     return {**shown, "table": _table(world) if isinstance(world, TableWorld) else None, "demonstrations": _recorded(loop)}
+
+
+def _earned(loop: "Loop") -> np.ndarray:
+    """(N, 2) discounted and undiscounted return of the episodes that were given, by the table's reward where there is one.
+
+    A dataset need not hold rewards: a log that was imported may have none.
+    """
+    world = loop.world
+    paid = [
+        world.table.reward.values[episode.rows(world.table.states)[:-1], episode.actions]
+        if isinstance(world, TableWorld)
+        else episode.rewards
+        for episode in loop.demonstrations
+    ]
+    return np.array([[world.gamma ** np.arange(len(one)) @ one, one.sum()] for one in paid])
+
+
+def _score(value: float, random: float, expert: float) -> float | None:
+    """Random = 0, expert = 1; None where the expert earns no more than random actions, and there is no such scale."""
+    return _plain(metrics.normalised_score(value, random, expert)) if expert > random else None
 
 
 def from_data(loop: "Loop") -> bool:
@@ -97,7 +118,7 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
         told["reward_on"] = "state" if world.tabular(loop.learned).on_states else "state-action"
         worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
         value = worst.value if world.horizon is None else world.value(worst.policy)
-        share = (expert - value) / (expert - random) if expert != random else float("nan")
+        share = (expert - value) / (expert - random) if expert > random else float("nan")
         told |= {
             "worst_tie_value": value,
             "worst_tie_regret": expert - value,
@@ -142,7 +163,7 @@ def _read_curve(path: Path) -> np.ndarray:
 
 def settled_at(curve: np.ndarray, random: float, expert: float) -> int | None:
     """Environment steps after which the score on a learning curve (n, 2) stays at GOOD or above; None if it does not."""
-    if expert == random or not len(curve):
+    if not expert > random or not len(curve):
         return None
     bad = np.flatnonzero((curve[:, 1] - random) / (expert - random) < GOOD)
     first = bad[-1] + 1 if bad.size else 0

@@ -41,6 +41,8 @@ def _policies(report: Report) -> Table:
     given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
     errs = " with its errors" if only and not given else ""
     table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
+    if report.metrics["policies"]["expert"]["score"] is None:
+        table.caption += " There is no score: the expert earns no more than random actions."
     if known:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if report.metrics["table"] is not None:
@@ -65,7 +67,11 @@ def _how_valued(report: Report) -> str:
     table = report.metrics["table"]
     if table is None:
         return "discounted, from the start, mean of episodes"
-    given = f", cut after {table['horizon']} steps, the expert's from its episodes" if table["horizon"] is not None else ""
+    given = (
+        f", cut after {table['horizon']} steps, the expert's that of its episodes, paid by the table"
+        if table["horizon"] is not None
+        else ""
+    )
     where = "exact" if table["exact"] else "computed on a table that is an estimate"
     return f"{where}, discounted, from the start{given}"
 

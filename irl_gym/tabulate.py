@@ -77,6 +77,7 @@ def tabulate(
         NotTabular: the environment cannot be copied, or something acts outside its table.
         HiddenState: one observation behaves in two ways.
         EnumerationLimit: more states than allowed.
+        UnknownObservation, InvalidReward: the environment left its own observation space, or paid NaN.
         TableMismatch: `env.step` did what the table says is impossible.
     """
     check_discount(gamma)
@@ -85,11 +86,15 @@ def tabulate(
     for name, value in (("check_steps", check_steps), ("seed", seed)):
         checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
     if not isinstance(env.action_space, spaces.Discrete):
-        raise NotDiscrete(
-            f"the action space is {env.action_space}: expected Discrete. Discretise the actions first, as with "
-            "`gymnasium.wrappers.DiscretizeAction`."
-        )
+        many = isinstance(env.action_space, spaces.MultiDiscrete | spaces.MultiBinary)
+        mend = "Number its combinations, with a wrapper that turns one number into several"
+        other = "Discretise the actions first, as with `gymnasium.wrappers.DiscretizeAction`"
+        raise NotDiscrete(f"the action space is {env.action_space}: expected Discrete. {mend if many else other}.")
     learned = _learned_reward(env)
+    if by is not None and (isinstance(by, type) or not isinstance(by, By)):
+        raise InvalidParameter(
+            f"by is {by!r}: expected None, `Enumeration(...)` or `Interaction(...)`, made with its arguments."
+        )
     by = by or Enumeration(known=True)
     known = (source(env, gamma) for source in SOURCES) if isinstance(by, Enumeration) and by.known else ()
     found = next(filter(None, known), None) or by.table(env, gamma, progress)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from irl_gym.datasets import read_minari
+from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrated import most_frequent
-from irl_gym.demonstrations import empirical_policy
+from irl_gym.demonstrations import Episode, empirical_policy
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import DatasetMismatch, InvalidParameter
 from irl_gym.experiment import Experiment
@@ -78,9 +78,15 @@ def test_values_are_cut_at_the_time_limit(from_data, source):
     assert (from_data.metrics["table"]["horizon"], source.metrics["table"]["horizon"]) == (LIMIT, None)
 
 
-def test_the_experts_value_is_the_mean_of_its_episodes(from_data, source):
-    mean = discounted_mean(episodes_of(source), GAMMA)
-    assert from_data.metrics["policies"]["expert"]["value"] == pytest.approx(mean)
+def test_the_experts_value_is_the_mean_of_its_episodes_paid_by_the_table(from_data, source, toy_text):
+    R = toy_text("FrozenLake 4x4 slippery").reward.values
+    paid = [GAMMA ** np.arange(len(one)) @ R[one.observations[:-1], one.actions] for one in episodes_of(source)]
+    assert from_data.metrics["policies"]["expert"]["value"] == pytest.approx(np.mean(paid))
+
+
+def test_the_experts_value_is_near_what_its_episodes_recorded(from_data, source):
+    recorded_mean = discounted_mean(episodes_of(source), GAMMA)
+    assert from_data.metrics["policies"]["expert"]["value"] == pytest.approx(recorded_mean, abs=0.02)
 
 
 @pytest.mark.parametrize("policy", ["random", "retrained"])
@@ -139,7 +145,7 @@ def test_the_report_of_a_dataset_says_whose_values_are_cut(from_data):
     console = Console(record=True, width=300, file=io.StringIO())
     print_report(from_data, console)
     text = " ".join(console.export_text().split())
-    for words in (f"cut after {LIMIT} steps, the expert's from its episodes", "with an optimal action", "expert = 1"):
+    for words in (f"cut after {LIMIT} steps, the expert's that of its episodes", "with an optimal action", "expert = 1"):
         assert words in text
 
 
@@ -168,3 +174,31 @@ def test_a_dataset_of_another_environment_is_refused(source, tmp_path):
     asked = Experiment("FrozenLake-v1", GAMMA, {"map_name": "8x8"}, learner=SOFT, **data_of(source))
     with pytest.raises(DatasetMismatch, match="8x8"):
         Loop(asked, tmp_path / "run").stage("expert")
+
+
+def without_rewards(report, root, keep):
+    """The same dataset as a log has it: no rewards, and as many steps of each episode as `keep` says."""
+    env = gym.make("FrozenLake-v1", **LAKE)
+    episodes = [
+        Episode(one.observations[: n + 1], one.actions[:n], np.zeros(n), one.terminated and n == len(one), n < len(one))
+        for one in read_minari(DATA, root=report.out / "dataset")
+        if (n := keep(len(one))) > 0
+    ]
+    write_minari(episodes, "me/log-v0", env, root=root, algorithm="a log")
+    return recover_and_retrain(
+        Experiment(None, GAMMA, dataset="me/log-v0", dataset_root=str(root), learner=SOFT, **FEW), root / "run"
+    )
+
+
+def test_an_expert_without_recorded_rewards_is_paid_by_the_table(source, from_data, tmp_path):
+    paid = without_rewards(source, tmp_path, lambda n: n).metrics["policies"]["expert"]
+    assert paid["value"] == pytest.approx(from_data.metrics["policies"]["expert"]["value"], abs=0.03) and paid["score"] == 1
+
+
+def test_there_is_no_score_when_the_expert_earns_no_more_than_random_actions(source, tmp_path):
+    report = without_rewards(source, tmp_path, lambda n: min(n - 1, 2))
+    assert [row["score"] for row in report.metrics["policies"].values()] == [None] * 3
+    assert report.metrics["reward"]["worst_tie_regret_share"] is None
+    console = Console(file=io.StringIO(), width=200)
+    print_report(report, console)
+    assert "There is no score: the expert earns no more than random actions." in " ".join(console.file.getvalue().split())

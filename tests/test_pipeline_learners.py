@@ -193,7 +193,7 @@ SAID = {
     "table, trajectories": (*COMMON, "best round", "distance", "cut after", "noise alone makes about"),
     "cells, features": (*COMMON, "computed on a table that is an estimate"),
     "steps, trajectories": (*COMMON, "mean of episodes", "best round"),
-    "dataset, features": (*COMMON, "the expert's from its episodes"),
+    "dataset, features": (*COMMON, "the expert's that of its episodes"),
 }
 
 

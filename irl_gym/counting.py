@@ -23,6 +23,7 @@ from irl_gym.checks import checked_number
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.demonstrations import Episode, stacked
+from irl_gym.enumeration.trials import called
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP, check_discount
@@ -116,7 +117,11 @@ class Counting:
             f"Counts of {int(visits.sum())} steps in {seen.n_episodes} episodes, which visit {total - missing.size} of {total} "
             f"pairs (s, a) of states that are not terminal; prior {self.prior:g}, unvisited pairs: {self.unvisited}."
         )
-        evidence = Evidence(method, exact=False, merged=0, split=len(copies), check=None, error=counts.largest_error())
+        # Hoeffding's inequality for all first states at once, those that no episode began in too.
+        start_error = min(1.0, float(np.sqrt(np.log(2 * n / 0.05) / (2 * seen.n_episodes))))
+        evidence = Evidence(
+            method, exact=False, merged=0, split=len(copies), check=None, error=max(counts.largest_error(), start_error)
+        )
         reward = TabularReward(payments.mean, {"source": "samples"})
         table = Tabulation(TabularMDP(P, gamma, d0), reward, payments, states, evidence)
         return CountedTable(table, counts)
@@ -173,7 +178,7 @@ class Interaction:
 
         Raises:
             NotDiscrete: observations or actions that are not made of integers.
-            NotTabular: the environment cannot be copied.
+            NotTabular: the environment cannot be copied, or raises an error.
         """
         space: Any = env.action_space
         episodes = interact(without_watchers(env), self.steps, seed=self.seed)
@@ -204,6 +209,7 @@ def interact(env: gym.Env, steps: int, *, seed: int, policy: Policy | None = Non
 
     Raises:
         NotDiscrete: other actions.
+        NotTabular: the environment raised an error, or a step did not return five values.
         InvalidParameter: fewer than 1 steps, or a negative seed.
     """
     if not isinstance(env.action_space, spaces.Discrete):
@@ -233,16 +239,21 @@ def _episodes(env: gym.Env, steps: int, seed: int, choose: Callable[[Any], int])
     first = int(getattr(env.action_space, "start", 0))
     left, begin = steps, seed
     while left:
-        observation, _ = env.reset(seed=begin)
+        observation = called(lambda begin=begin: env.reset(seed=begin)[0])
         observations, actions, rewards = [observation], [], []
         terminated = truncated = False
         while not (terminated or truncated):
             action = choose(observation)
-            observation, reward, terminated, truncated, _ = env.step(action + first)
+            observation, reward, terminated, truncated = called(lambda action=action + first: _step(env, action))
             observations.append(observation)
             actions.append(action)
-            rewards.append(float(reward))
+            rewards.append(reward)
             truncated = truncated or (not terminated and len(actions) in (limit, left))
         left -= len(actions)
         yield Episode(stacked(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), begin)
         begin = None
+
+
+def _step(env: gym.Env, action: int) -> tuple[Any, float, bool, bool]:
+    observation, reward, terminated, truncated, _ = env.step(action)
+    return observation, float(reward), bool(terminated), bool(truncated)

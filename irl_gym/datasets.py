@@ -5,7 +5,6 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 """
 
 import contextlib
-import json
 import os
 import shutil
 import tempfile
@@ -17,7 +16,6 @@ import gymnasium as gym
 import minari
 import numpy as np
 from gymnasium import spaces
-from gymnasium.envs.registration import EnvSpec
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations import Episode
@@ -29,12 +27,13 @@ from irl_gym.errors import (
     NotDiscrete,
     UnknownEnvironment,
 )
-from irl_gym.minari_files import Description, check_free, check_id, publish, write_files
+from irl_gym.minari_files import Description, check_free, check_id, identity, publish, write_files
 from irl_gym.minari_formats import DataFormat
 from irl_gym.states import States
-from irl_gym.watching import WATCHING
 
 _ROOT = "MINARI_DATASETS_PATH"
+_BROKEN = (OSError, ValueError, KeyError, TypeError, AttributeError, AssertionError, RuntimeError)
+"""What Minari and h5py raise on files that are missing, cut off, or not a dataset's."""
 
 
 @contextlib.contextmanager
@@ -157,6 +156,7 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
     Raises:
         InvalidParameter: a malformed id.
         DatasetMissing: no dataset of that id under the root; those that are there are named.
+        InvalidDemonstrations: a dataset that Minari cannot read.
     """
     if root is not None and not Path(root).is_dir():
         raise DatasetMissing(f"{root} is no folder: expected Minari's root, under which {dataset_id!r} is. Name another.")
@@ -169,7 +169,10 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
                 f"dataset {dataset_id!r} is not under {base}: expected one of the datasets there. {there} Name the root "
                 "folder, or set MINARI_DATASETS_PATH."
             )
-        return minari.load_dataset(dataset_id)
+        try:
+            return minari.load_dataset(dataset_id)
+        except _BROKEN as error:
+            raise _broken(dataset_id, error) from error
 
 
 def read_minari(
@@ -184,14 +187,15 @@ def read_minari(
     Args:
         dataset: a dataset, or the id of one under `root`.
         states: refuse a dataset whose observations are not this index's.
-        env: refuse a dataset recorded in another environment, by id and arguments.
+        env: refuse a dataset recorded in another environment, by id and arguments. Where the dataset does not say where it was
+            recorded, or in one that is not registered here, its spaces are compared.
         root: Minari's root folder; None for the one in force.
 
     Raises:
         FileNotFoundError: no dataset of that id.
         NotDiscrete: continuous actions.
         DatasetMismatch: recorded in another environment, or one with other observations.
-        InvalidDemonstrations: no episode.
+        InvalidDemonstrations: no episode, one without steps, a reward that is not finite, or a file that cannot be read.
     """
     if isinstance(dataset, str):
         dataset = load_minari(dataset, root=root)
@@ -203,22 +207,64 @@ def read_minari(
             f"dataset {dataset.spec.dataset_id!r} was recorded in an environment with observations "
             f"{dataset.spec.observation_space}: expected {states.space}. Is it another environment's?"
         )
-    if env is not None and _identity(dataset.env_spec) != _identity(env.spec):
-        raise DatasetMismatch(
-            f"dataset {dataset.spec.dataset_id!r} was recorded in {_identity(dataset.env_spec)}: expected "
-            f"{_identity(env.spec)}. Make the environment with `dataset.recover_environment()`."
-        )
+    if env is not None:
+        _check_recorded(dataset, env)
     if not dataset.total_episodes:
         raise InvalidDemonstrations(
             f"dataset {dataset.spec.dataset_id!r} has no episodes: expected at least one. Record some, or name another."
         )
     first = int(actions.start)
-    metadatas = dataset.storage.get_episode_metadata(dataset.episode_indices)
-    for episode, metadata in zip(dataset.iterate_episodes(), metadatas, strict=True):
+    for episode, metadata in _stored(dataset):
+        here = f"dataset {dataset.spec.dataset_id!r}, episode {episode.id}"
+        rewards = np.asarray(episode.rewards, float)
+        if not len(episode.actions) or not len(episode.terminations):
+            raise InvalidDemonstrations(f"{here} has no steps: expected at least one. Leave it out.")
+        wrong = np.flatnonzero(~np.isfinite(rewards))
+        if wrong.size:
+            raise InvalidDemonstrations(
+                f"{here}, step {wrong[0]} has reward {rewards[wrong[0]]}: expected a finite number. Write the dataset without "
+                "that episode, or with 0.0 where rewards are not known."
+            )
         yield Episode(
-            episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, np.asarray(episode.rewards, float),
+            episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, rewards,
             bool(episode.terminations[-1]), bool(episode.truncations[-1]), metadata.get("seed"),
         )  # fmt: skip
+
+
+def _stored(dataset: minari.MinariDataset) -> Iterator[tuple[Any, Any]]:
+    """Episodes and their metadata, as Minari gives them."""
+    try:
+        metadatas = dataset.storage.get_episode_metadata(dataset.episode_indices)
+        yield from zip(dataset.iterate_episodes(), metadatas, strict=True)
+    except _BROKEN as error:
+        raise _broken(dataset.spec.dataset_id, error) from error
+
+
+def _broken(dataset_id: str, error: Exception) -> InvalidDemonstrations:
+    reason = " ".join(str(error).split())
+    return InvalidDemonstrations(
+        f"dataset {dataset_id!r} cannot be read ({type(error).__name__}: {reason}): expected a whole Minari dataset. Copy or "
+        "download it again, or record it anew under another id."
+    )
+
+
+def _check_recorded(dataset: minari.MinariDataset, env: gym.Env) -> None:
+    """Was a dataset recorded in this environment, as far as it can be told?"""
+    name, spec = dataset.spec.dataset_id, dataset.env_spec
+    if spec is not None and (spec.id in gym.registry or (env.spec is not None and env.spec.id == spec.id)):
+        if identity(spec) != identity(env.spec):
+            raise DatasetMismatch(
+                f"dataset {name!r} was recorded in {identity(spec)}: expected {identity(env.spec)}. Make the environment with "
+                "`dataset.recover_environment()`."
+            )
+        return
+    for what in ("observation", "action"):
+        found, wanted = getattr(dataset.spec, f"{what}_space"), getattr(env, f"{what}_space")
+        if found != wanted:
+            raise DatasetMismatch(
+                f"dataset {name!r} has {what}s of {found}: expected {wanted}, as the environment has. Name the one that it was "
+                "recorded in, or one with its spaces."
+            )
 
 
 def recorded_environment(dataset: minari.MinariDataset) -> gym.Env:
@@ -245,18 +291,3 @@ def recorded_environment(dataset: minari.MinariDataset) -> gym.Env:
             f"environment {spec.id!r}, in which dataset {name!r} was recorded, cannot be made here ({type(error).__name__}: "
             f"{error}): expected it to take {spec.kwargs}. Is it another version? Name an environment with --env-id."
         ) from error
-
-
-def _identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
-    """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
-    if spec is None:
-        return None
-    kwargs = _plain(spec.kwargs)
-    kwargs.pop("render_mode", None)
-    wrappers = [(one.name, one.entry_point, _plain(one.kwargs)) for one in spec.additional_wrappers if one.name not in WATCHING]
-    return (spec.id, kwargs, wrappers) if wrappers else (spec.id, kwargs)
-
-
-def _plain(value: Any) -> Any:
-    """As json gives it back: lists for tuples."""
-    return json.loads(json.dumps(value, default=repr))

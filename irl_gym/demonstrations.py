@@ -13,7 +13,7 @@ import numpy as np
 
 from irl_gym._typing import Matrix, StateMask
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidDemonstrations
+from irl_gym.errors import InvalidDemonstrations, UnknownObservation
 from irl_gym.features import batch_size
 from irl_gym.mdp import TransitionTable
 from irl_gym.policies import Policy, as_distribution
@@ -225,17 +225,26 @@ def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int
 
     Raises:
         InvalidDemonstrations: an action out of range, naming episode and step; or no episode.
-        UnknownObservation: an observation that the index does not hold.
+        UnknownObservation: an observation that the index does not hold, naming the episode.
     """
     counts = np.zeros((states.n_states, n_actions), dtype=np.int64)
     number = -1
     for number, episode in enumerate(episodes):
+        if not isinstance(episode, Episode):
+            raise InvalidDemonstrations(
+                f"episode {number} is a {type(episode).__name__}: expected an Episode. Read Minari datasets with "
+                "`read_minari(dataset)`, and other data with `irl_gym.imports`."
+            )
         wrong = np.flatnonzero((episode.actions < 0) | (episode.actions >= n_actions))
         if wrong.size:
             raise InvalidDemonstrations(
                 f"episode {number}, step {wrong[0]} takes action {episode.actions[wrong[0]]}: expected 0 to {n_actions - 1}."
             )
-        np.add.at(counts, (episode.rows(states)[:-1], episode.actions), 1)
+        try:
+            rows = episode.rows(states)
+        except UnknownObservation as error:
+            raise UnknownObservation(f"episode {number}: {error}") from error
+        np.add.at(counts, (rows[:-1], episode.actions), 1)
     if number < 0:
         raise InvalidDemonstrations("there are no episodes: expected at least one.")
     return EmpiricalPolicy(counts)

@@ -23,6 +23,7 @@ from irl_gym.checks import checked_number
 from irl_gym.choices import PlannerName, planner_named
 from irl_gym.demonstrations import Episode, collect, collect_from_table
 from irl_gym.dynamic_programming import value_iteration
+from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.experts import Acting, load_expert
 from irl_gym.export import Demonstrator
@@ -108,7 +109,8 @@ class Recording:
     """Who acts, and how.
 
     Raises:
-        InvalidParameter: no such expert, epsilon outside 0 to 1, fewer than 1 steps, or a seed that is not 0 to 2^32 - 1.
+        InvalidParameter: no such expert, epsilon outside 0 to 1, fewer than 1 steps or states, or a seed that is not 0 to
+            2^32 - 1.
         InvalidDiscount: gamma outside (0, 1).
     """
 
@@ -124,12 +126,14 @@ class Recording:
     """Truncate longer episodes; None for the environment's own limit, or 500 where it has none."""
     total_timesteps: int | None = None
     """That an agent is trained for; None for its default."""
+    max_states: int | None = None
+    """That an enumeration may find; None for its default."""
 
     def __post_init__(self) -> None:
         check_discount(self.gamma)
         checked_epsilon(self.epsilon)
         checked_number("seed", self.seed, "a whole number from 0 to 2^32 - 1", least=0, below=2**32, whole=True)
-        for name in ("max_episode_steps", "total_timesteps"):
+        for name in ("max_episode_steps", "total_timesteps", "max_states"):
             if getattr(self, name) is not None:
                 checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
         if self.expert not in NAMED and not Path(self.expert).is_file():
@@ -150,6 +154,13 @@ class Recording:
             found["expert"] = f"file with sha256 {hashlib.sha256(Path(self.expert).read_bytes()).hexdigest()}"
         return found
 
+    def metadata(self, env_id: str) -> dict[str, Any]:
+        """What a dataset of these episodes says of itself, in Minari's words."""
+        return {
+            "algorithm_name": Path(self.expert).name, "author": {"irl_gym"}, "author_email": {"none given"},
+            "description": f"Episodes in {env_id}, gamma {self.gamma}, epsilon {self.epsilon}, seed {self.seed}.",
+        }  # fmt: skip
+
     def demonstrator(self, env: gym.Env, folder: Path, on_training: OnTraining | None = None) -> Demonstrator:
         """Make or load the expert, and let it act.
 
@@ -160,7 +171,7 @@ class Recording:
 
         Raises:
             NotDiscrete: continuous actions, or a table of actions for observations that cannot be numbered.
-            NotTabular: value-iteration where there is no table.
+            NotTabular: value-iteration where there is no table, or one of more states than allowed.
             InvalidPolicy: a table of actions of another size.
             DatasetMismatch: an agent of another environment.
         """
@@ -184,8 +195,9 @@ class Recording:
         return Stepped(env, lambda seed: TabularPolicy(policy, states, seed), limit, self.seed, deterministic=False)
 
     def _table(self, env: gym.Env) -> Tabulation | None:
+        by = None if self.max_states is None else Enumeration(known=True, max_states=self.max_states)
         try:
-            return tabulate(env, gamma=self.gamma, seed=self.seed)
+            return tabulate(env, gamma=self.gamma, by=by, seed=self.seed)
         except (NotTabular, NotDiscrete) as error:
             if self.expert == "value-iteration":
                 raise type(error)(f"{error} Or choose ppo, dqn or a2c, experts that need no table.") from error

@@ -64,12 +64,14 @@ def footnote(figure: Figure, layout: GridLayout, *, shaded: str = "", policies: 
 def cells(
     axis: Axes, layout: GridLayout, values: np.ndarray, *, cmap: str, norm: Normalize, label: str, ends: bool = True
 ) -> None:
-    """A map coloured by values (S,), with numbers where there is room; `ends=False` leaves terminal cells without."""
-    hidden = layout.blocked if ends else layout.blocked | layout.terminal
+    """A map coloured by values (S,), blank where NaN, with numbers where there is room; `ends=False` leaves ends blank."""
+    unknown = ~np.isfinite(layout.cells(values)) & ~layout.blocked
+    hidden = (layout.blocked if ends else layout.blocked | layout.terminal) | unknown
     shown = np.ma.masked_array(layout.cells(values), hidden)
     mappable = ScalarMappable(norm, cmap)
     colours = mappable.to_rgba(shown)[..., :3]
     colours[layout.blocked] = to_rgb(BLOCKED)
+    colours[unknown] = to_rgb(OPEN)
     if not ends:
         _tint_ends(colours, layout)
     _show(axis, layout, colours)

@@ -44,14 +44,16 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
     mdp, true, learned = table.mdp, table.reward, world.tabular(loop.learned)
     numbered = isinstance(table.states, StateIndex)  # row = cell; not where only some cells are listed
     layout = grid_layout(loop.env, mdp) if table.evidence.exact and numbered else None
-    expert = loop.expert
+    expert, unknown = loop.expert, np.zeros(mdp.n_states, dtype=bool)
     if expert.ndim == 2:  # read from data: where nothing is known, random
         known = ~np.isnan(expert).any(axis=1)
+        unknown = ~known
         expert = np.where(known[:, None], expert, 1 / mdp.n_actions)
         taken = (expert > 0) & known[:, None]
     else:
         taken = as_distribution(expert, mdp.n_states, mdp.n_actions) > 0
     values = [evaluate_policy(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
+    values = [np.where(unknown & ~mdp.terminal, np.nan, V) for V in values]  # nothing is known of the expert there
     if isinstance(table.states, Cells) and len(table.states.shape) == 2:
         told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)
         return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})

@@ -6,6 +6,7 @@ Minari looks for it. A dataset is written beside its place, its totals last, and
 
 import copy
 import importlib.util
+import json
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from minari.serialization import serialize_space
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetExists, InvalidDemonstrations, InvalidParameter
 from irl_gym.minari_formats import WRITERS, DataFormat
+from irl_gym.watching import WATCHING
 
 _NAMESPACE = "namespace_metadata.json"
 
@@ -91,6 +93,21 @@ def spec_json(spec: EnvSpec | None) -> str | None:
         ) from error
 
 
+def identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
+    """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
+    if spec is None:
+        return None
+    kwargs = _plain(spec.kwargs)
+    kwargs.pop("render_mode", None)
+    wrappers = [(one.name, one.entry_point, _plain(one.kwargs)) for one in spec.additional_wrappers if one.name not in WATCHING]
+    return (spec.id, kwargs, wrappers) if wrappers else (spec.id, kwargs)
+
+
+def _plain(value: Any) -> Any:
+    """As json gives it back: lists for tuples."""
+    return json.loads(json.dumps(value, default=repr))
+
+
 def check_id(dataset_id: str) -> None:
     """Check that Minari takes an id.
 
@@ -100,7 +117,8 @@ def check_id(dataset_id: str) -> None:
     try:
         parse_dataset_id(dataset_id)
     except (ValueError, TypeError) as error:
-        raise InvalidParameter(f"dataset id {dataset_id!r} is malformed ({error}): expected namespace/name-v0.") from error
+        why = f" ({error})" if isinstance(error, ValueError) else ""  # the other is Minari's stumble over a missing version
+        raise InvalidParameter(f"dataset id {dataset_id!r} is malformed{why}: expected namespace/name-v0.") from error
 
 
 def check_free(base: Path, dataset_id: str) -> None:

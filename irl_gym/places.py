@@ -55,12 +55,11 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
         if not isinstance(env.action_space, spaces.Discrete):
             raise
         if not isinstance(asked.learner, TrajectoryLP):
-            how = (
-                "For cells give bins; or learn" if "floats" in str(error) else f"{ON_COMMAND_LINE.get(type(error), '')}Or learn"
-            )
+            how = ON_COMMAND_LINE.get(type(error), "Or count what random steps do (--table sample). ")
+            how = "For cells give bins; or learn" if "floats" in str(error) else f"{how}Or learn"
             raise type(error)(
-                f"{asked.env_id or asked.dataset} has no table: {error} {how} from episodes alone, with TrajectoryLP "
-                "(--learner trajectory-lp)."
+                f"no table of {asked.env_id or asked.dataset}: {error} {how} from episodes alone, with TrajectoryLP (--learner "
+                "trajectory-lp)."
             ) from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):

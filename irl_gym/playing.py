@@ -25,6 +25,7 @@ from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidParameter
 from irl_gym.keyboard import AGAIN, HELP, QUIT, Controls, controls_of, described
 from irl_gym.minari_files import check_free, check_id
+from irl_gym.reveal import Reveal, known_hidden
 from irl_gym.tabulate import make
 
 Mode = Literal["terminal", "window"]
@@ -184,6 +185,7 @@ def stage(env_id: str, env_kwargs: Mapping[str, Any], mode: Mode) -> tuple[gym.E
     if "render_mode" in env_kwargs:
         raise InvalidParameter(f"env-kwargs has render_mode={env_kwargs['render_mode']}: expected none. Choose with the mode.")
     plain = make(env_id, **env_kwargs)
+    plain = Reveal(plain) if known_hidden(plain) else plain  # as the loop records it
     controls_of(plain)
     offered = list(plain.metadata.get("render_modes") or ())
     found = [one for one in _RENDER_MODES[mode] if one in offered]
@@ -194,6 +196,7 @@ def stage(env_id: str, env_kwargs: Mapping[str, Any], mode: Mode) -> tuple[gym.E
             f"{other or ' Give it a `render` and name its modes in metadata.'}"
         )
     shown = make(env_id, **env_kwargs, render_mode=found[0])
+    shown = Reveal(shown) if known_hidden(shown) else shown
     try:
         shown.reset(seed=0)
         shown.render()

@@ -77,12 +77,12 @@ def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: 
 
     Args:
         layout: the map, or None for an environment that has none.
-        true_values: (S,) expected discounted sum of true rewards from each state.
+        true_values: (S,) expected discounted sum of true rewards from each state; NaN where the expert is not known.
         learned_values: (S,) the same with the learned reward; its unit is the learned reward's.
         table: S states.
     """
     figure, axes = drawing.panels(layout)
-    judged = table.reachable & ~table.terminal
+    judged = table.reachable & ~table.terminal & np.isfinite(true_values)
     if layout is None:
         drawing.sorted_line(axes[0], true_values[judged])
         axes[0].set(title="Expert's value under the true reward", xlabel="states, best first", ylabel="discounted value")
@@ -93,7 +93,8 @@ def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: 
         )  # fmt: skip
         drawing.plain(axes[1])
         return figure
-    titles = ("Expert's value, true reward", "Expert's value, learned reward")
+    seen = "" if np.isfinite(true_values[table.reachable & ~table.terminal]).all() else ", where it was seen"
+    titles = (f"Expert's value, true reward{seen}", f"Expert's value, learned reward{seen}")
     for axis, title, V in zip(axes, titles, (true_values, learned_values), strict=True):
         norm = Normalize(float(V[judged].min()), float(V[judged].max()))
         drawing.cells(axis, layout, V, cmap="viridis", norm=norm, label="discounted value", ends=False)

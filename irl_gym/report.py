@@ -12,6 +12,10 @@ MUCH = 0.05
 """Share of the expert's advantage over random; a worst tie that loses more is worth a warning."""
 
 
+ENOUGH = 0.9
+"""Score of an agent that has learned what the reward asks for."""
+
+
 def print_report(report: Report, console: Console) -> None:
     """Print what a run found."""
     for part in render(report):
@@ -47,8 +51,17 @@ def _policies(report: Report) -> Table:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
+    table.caption += _of_training(report)
     table.caption_justify = "left"
     return table
+
+
+def _of_training(report: Report) -> str:
+    """Where the reward is good and the agent is not, what to do."""
+    score, share = report.metrics["policies"]["retrained"]["score"], report.metrics["reward"].get("worst_tie_regret_share")
+    if score is None or share is None or score >= ENOUGH or share > MUCH:
+        return ""
+    return "\nThe reward is good and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
 
 
 OPTIMAL, OWN = "an optimal action", "one of the expert's actions"

@@ -24,6 +24,13 @@ LEAST_P_VALUE = 1e-9
 """Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are
 expected, so that a right table fails more often than this, if still hardly ever."""
 
+LONG = 2_000
+"""Steps that every other walk may take at least."""
+OUTSIDE = (
+    "Something acts outside the table. Where it was enumerated, the observation may hide part of the state: show it with "
+    "`irl_gym.reveal.Reveal`."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Payments:
@@ -71,7 +78,8 @@ def compare_with_steps(
     A = mdp.n_actions
     first_action = int(getattr(walker.action_space, "start", 0))
     seen, paid, starts = np.empty((steps, 2), dtype=np.int64), np.empty(steps), []
-    limit = 20 * mdp.n_states  # a walk that never ends is started again
+    # A walk that never ends is started again: in turn late, since an environment may count its steps, and early.
+    limits = 20 * mdp.n_states, max(20 * mdp.n_states, LONG)
 
     def begin(**kwargs: Any) -> int:
         starts.append(_row_of(states, walker.reset(**kwargs)[0], terminated=False))
@@ -87,7 +95,7 @@ def compare_with_steps(
         _check_transition(mdp, row, a, following, bool(terminated))
         age += 1
         row = following
-        if terminated or truncated or age >= limit:
+        if terminated or truncated or age >= limits[len(starts) % 2]:
             row, age = begin(), 0
     _check_rewards(mdp, payments, seen, paid)
     return _chi_square(mdp, seen, np.array(starts))
@@ -97,10 +105,7 @@ def _row_of(states: States, observation: Any, *, terminated: bool) -> int:
     try:
         return states.encode(observation, terminated=terminated)
     except UnknownObservation as error:
-        raise TableMismatch(
-            f"the environment showed what the table does not hold: {error} Where the table was enumerated, the observation may "
-            "hide part of the state: try more `revisits`."
-        ) from error
+        raise TableMismatch(f"the environment showed what the table does not hold: {error} {OUTSIDE}") from error
 
 
 def _copy_of(env: gym.Env) -> gym.Env:
@@ -114,7 +119,10 @@ def _copy_of(env: gym.Env) -> gym.Env:
 
 def _check_start(mdp: TabularMDP, row: int) -> None:
     if not mdp.d0[row] > 0:
-        raise TableMismatch(f"reset began in state {row}, which has probability 0 in d0: correct `initial_state_distrib`.")
+        raise TableMismatch(
+            f"reset began in state {row}, which has probability 0 in d0: expected a first state of the table. Correct the "
+            f"start that is published, where one is. {OUTSIDE}"
+        )
 
 
 def _check_transition(mdp: TabularMDP, s: int, a: int, following: int, terminated: bool) -> None:
@@ -123,12 +131,11 @@ def _check_transition(mdp: TabularMDP, s: int, a: int, following: int, terminate
     if following not in possible:
         raise TableMismatch(
             f"step took (s={s}, a={a}) to {following}, terminated={terminated}: the table allows {possible.tolist()} only. "
-            "Something acts outside the published P."
+            f"{OUTSIDE}"
         )
     if terminated != bool(mdp.terminal[following]):
         raise TableMismatch(
-            f"step from (s={s}, a={a}) to {following} said terminated={terminated}: the table says "
-            f"{not terminated}. Something acts outside the published P."
+            f"step from (s={s}, a={a}) to {following} said terminated={terminated}: the table says {not terminated}. {OUTSIDE}"
         )
 
 
@@ -143,8 +150,7 @@ def _check_rewards(mdp: TabularMDP, payments: Payments, seen: np.ndarray, paid: 
     if wrong.size:
         (s, a), following = divmod(int(rows[wrong[0]]), mdp.n_actions), int(seen[wrong[0], 1])
         raise TableMismatch(
-            f"step from (s={s}, a={a}) to {following} paid {paid[wrong[0]]}: the table says {expected[wrong[0]]:.6g}. Is the "
-            "reward changed outside the published P?"
+            f"step from (s={s}, a={a}) to {following} paid {paid[wrong[0]]}: the table says {expected[wrong[0]]:.6g}. {OUTSIDE}"
         )
     visits = np.maximum(np.bincount(rows, minlength=payments.mean.size), 1)
     mean = np.bincount(rows, weights=paid, minlength=payments.mean.size) / visits
@@ -157,7 +163,7 @@ def _check_rewards(mdp: TabularMDP, payments: Payments, seen: np.ndarray, paid: 
         s, a = divmod(int(far[0]), mdp.n_actions)
         raise TableMismatch(
             f"{visits[far[0]]} steps from (s={s}, a={a}) paid {mean[far[0]]:.4g} on average: the table says "
-            f"{payments.mean[s, a]:.4g}. Is the reward changed outside the published P?"
+            f"{payments.mean[s, a]:.4g}. {OUTSIDE}"
         )
 
 
@@ -175,7 +181,7 @@ def _chi_square(mdp: TabularMDP, seen: np.ndarray, starts: np.ndarray) -> SelfCh
     if p_value < LEAST_P_VALUE:
         raise TableMismatch(
             f"{len(seen)} steps differ from the table's probabilities: chi-square {statistic:.1f} on {degrees} degrees of "
-            f"freedom, p = {p_value:.1e}. Something acts outside the published P."
+            f"freedom, p = {p_value:.1e}. {OUTSIDE}"
         )
     acting = mdp.reachable & ~mdp.terminal
     return SelfCheck(len(seen), int((visits > 0).sum()), int(acting.sum()) * mdp.n_actions, statistic, degrees, p_value)

@@ -1,11 +1,16 @@
 """Episodes kept in a folder, a closed file for some at a time, so that what is written is never lost.
 
 A shard is an npz of columns, all its episodes one after the other: lengths, ends, seeds, actions, rewards, and the parts of the
-observations. It is written beside its place and renamed; a shard that cannot be read is dropped with those after it.
+observations. It is written beside its place and renamed. When a folder is opened, every shard is read against its checksums; a
+damaged one, and those after it, are set aside under names that end in `.damaged`, and their episodes are missing again.
 Axes: T steps, N episodes of a shard, M = sum of T.
 """
 
+import contextlib
+import errno
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,10 +19,16 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 
 SHARD_BYTES = 4 << 20
 """Of episodes, about: as many are held in memory at a time."""
 NO_SEED = -1
+_BESIDE = ".tmp.npz"
+_DAMAGE = (
+    ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What NumPy and zipfile raise on bytes that are no npz, or not the ones that were written."""
 
 
 class Shards:
@@ -26,6 +37,9 @@ class Shards:
     Args:
         folder: made with the first shard; what an earlier process left is kept.
         space: of the observations.
+
+    Raises:
+        InvalidParameter: a shard that is there and cannot be opened now; nothing is moved.
     """
 
     def __init__(self, folder: Path, space: spaces.Space):
@@ -36,7 +50,10 @@ class Shards:
             self._n_shards += 1
             self.n_episodes, self.n_steps = self.n_episodes + lengths.size, self.n_steps + int(lengths.sum())
         for path in set(folder.glob("*.npz")) - set(map(self._path, range(self._n_shards))):
-            path.unlink()
+            if path.name == _BESIDE:
+                path.unlink()
+            else:
+                path.replace(path.with_name(f"{path.name}.damaged"))
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:06}.npz"
@@ -56,7 +73,7 @@ class Shards:
         parts = [dict(_parts(self.space, one.observations)) for one in episodes]
         columns.update({name: np.concatenate([one[name] for one in parts]) for name in parts[0]})
         self.folder.mkdir(exist_ok=True)
-        beside = self.folder / ".tmp.npz"
+        beside = self.folder / _BESIDE
         np.savez(beside, **columns)
         beside.replace(self._path(self._n_shards))
         self._n_shards += 1
@@ -64,8 +81,7 @@ class Shards:
 
     def __iter__(self) -> Iterator[Episode]:
         for number in range(self._n_shards):
-            with np.load(self._path(number), allow_pickle=False) as archive:
-                columns = {name: archive[name] for name in archive.files}
+            columns = _columns(self._path(number))
             step = 0
             for i, length in enumerate(columns["lengths"].tolist()):
                 steps, seen = slice(step, step + length), slice(step + i, step + i + length + 1)
@@ -82,12 +98,51 @@ def size_of(space: spaces.Space, episode: Episode) -> int:
     return 16 * len(episode) + sum(part.nbytes for _, part in _parts(space, episode.observations))
 
 
-def _lengths(path: Path) -> np.ndarray | None:
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """The archive of a shard.
+
+    Raises:
+        FileNotFoundError: there is none.
+        InvalidParameter: it cannot be opened or read now, which says nothing about what is in it.
+    """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # np.load would leave a broken one open
-            return archive["lengths"]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            yield archive
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        if error.errno == errno.EINVAL:  # zipfile sought a place before the file's start
+            raise zipfile.BadZipFile(str(error)) from error
+        raise InvalidParameter(
+            f"{path} cannot be read now ({error}): expected a shard of episodes. Nothing is lost; ask again when it can."
+        ) from error
+
+
+def _lengths(path: Path) -> np.ndarray | None:
+    """(N,) steps of the episodes in a shard; None if there is none, or if it is damaged."""
+    try:
+        with _opened(path) as archive:
+            return archive["lengths"] if archive.zip.testzip() is None else None
+    except FileNotFoundError:
         return None
+    except InvalidParameter:  # a ValueError too
+        raise
+    except _DAMAGE:
+        return None
+
+
+def _columns(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with _opened(path) as archive:
+            return {name: archive[name] for name in archive.files}
+    except InvalidParameter:
+        raise
+    except (FileNotFoundError, *_DAMAGE) as error:
+        raise InvalidDemonstrations(
+            f"shard {path} was damaged since it was opened ({error}): expected the episodes that were written. Ask for the "
+            "same again: its episodes, and those after them, are then made anew."
+        ) from error
 
 
 def _parts(space: Any, observations: Any, name: str = "observations") -> Iterator[tuple[str, np.ndarray]]:

@@ -7,6 +7,7 @@ part of an MDP. Then `env.step` is sampled and compared with the table.
 """
 
 import difflib
+import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import gymnasium as gym
 from gymnasium import spaces
+from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.blackjack import blackjack_table
 from irl_gym.checks import checked_number
@@ -112,14 +114,17 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         InvalidParameter: arguments that the environment does not take.
     """
     try:
-        return gym.make(env_id, **kwargs)
+        env = gym.make(env_id, **kwargs)
+        _check_flags(env, kwargs)
+        return env
     except (TypeError, KeyError, ValueError) as error:
         if isinstance(error, IrlGymError):
             raise
         unexpected = re.search(r"unexpected keyword argument '(\w+)'", str(error))
         if unexpected:
             raise InvalidParameter(
-                f"{env_id} takes no argument {unexpected[1]!r}: expected those of the environment's constructor."
+                f"{env_id} takes no argument {unexpected[1]!r}: expected those of the environment's constructor"
+                f"{_arguments_of(env_id)}."
             ) from error
         raise InvalidParameter(f"{env_id} cannot be made with {kwargs}: {type(error).__name__}: {error}.") from error
     except (gym.error.Error, ModuleNotFoundError) as error:
@@ -140,6 +145,24 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             f"environment {env_id!r} is not registered: expected an id such as 'FrozenLake-v1'.{offer} An environment of "
             "another package needs its module named first, as in 'irl_gym_envs:irl_gym/GridWorld-v0'."
         ) from error
+
+
+def _arguments_of(env_id: str) -> str:
+    """The names of an environment's arguments, in brackets; nothing where they cannot be told."""
+    entry = gym.spec(env_id.rpartition(":")[2]).entry_point
+    maker = load_env_creator(entry) if isinstance(entry, str) else entry
+    if maker is None:
+        return ""
+    names = [name for name in inspect.signature(maker).parameters if name != "render_mode"]
+    return f" ({', '.join(names)})" if names else ""
+
+
+def _check_flags(env: gym.Env, kwargs: dict[str, Any]) -> None:
+    """Refuse text where the constructor's default is true or false: "flase" would be true."""
+    known = inspect.signature(type(env.unwrapped).__init__).parameters
+    for name, value in kwargs.items():
+        if isinstance(value, str) and name in known and isinstance(known[name].default, bool):
+            raise InvalidParameter(f"{name} is {value!r}: expected true or false, as its default {known[name].default}.")
 
 
 def _learned_reward(env: gym.Env) -> LearnedReward | None:

@@ -23,7 +23,8 @@ class Evidence:
     method: str
     """Where the probabilities come from, in a sentence."""
     exact: bool
-    """Are the probabilities exact, not estimated?"""
+    """Are the probabilities exact, not estimated? They are those of the states that the observations show: where a table was
+    enumerated, state that they hide was searched for and not found, which does not exclude it."""
     merged: int
     """Successors that stood more than once in a row and were added up."""
     split: int
@@ -31,7 +32,8 @@ class Evidence:
     check: SelfCheck | None
     """What sampling `env.step` found; None when it was not asked for."""
     error: float | None = 0.0
-    """All probabilities are within this of the environment's, with 95 % confidence; 0 where exact, None where not known."""
+    """All probabilities of P are within this of the environment's, with 95 % confidence, and so are those of d0; 0 where
+    exact, None where not known."""
 
     def __str__(self) -> str:
         """The evidence in a few lines a person reads."""

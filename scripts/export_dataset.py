@@ -18,11 +18,12 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.arguments import parse_reveal
+from irl_gym.choices import environment_of
 from irl_gym.datasets import described
 from irl_gym.demonstrators import Recording
 from irl_gym.experiment import parse_keywords
 from irl_gym.export import Amount, export_dataset
-from irl_gym.tabulate import make
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,12 @@ class Arguments:
     """namespace/name-v0; an id that is taken is never overwritten."""
     env_kwargs: tuple[str, ...] = ()
     """What the environment is made with: name=value ..., or one json object."""
+    start_seeds: tuple[int, ...] = ()
+    """Draw the layouts of resets from these seeds only; 0 fixes the layout of a MiniGrid environment."""
+    reveal: tuple[str, ...] = ("known",)
+    """Hidden integers that the observation shall show: name=number of values ...; known for those known to be hidden; none."""
+    max_states: int | None = None
+    """States that an enumeration may find."""
     expert: str = "value-iteration"
     """value-iteration, on the table; ppo, dqn or a2c, trained here; random; or a file: SB3's zip, or an npz of actions."""
     epsilon: float = 0.0
@@ -77,15 +84,11 @@ def main(arguments: Arguments) -> int:
         )
         recording = Recording(
             arguments.expert, arguments.gamma, arguments.epsilon, arguments.seed, arguments.max_episode_steps,
-            arguments.total_timesteps,
+            arguments.total_timesteps, arguments.max_states,
         )  # fmt: skip
-        env = make(arguments.env_id, **parse_keywords(arguments.env_kwargs))
-        metadata = {
-            "algorithm_name": Path(arguments.expert).name,
-            "author": {"irl_gym"}, "author_email": {"none given"}, "code_permalink": "scripts/export_dataset.py of irl_gym",
-            "description": f"Episodes in {arguments.env_id}, gamma {arguments.gamma}, epsilon {arguments.epsilon}, seed "
-            f"{arguments.seed}.",
-        }  # fmt: skip
+        keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
+        env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
+        metadata = {**recording.metadata(arguments.env_id), "code_permalink": "scripts/export_dataset.py of irl_gym"}
         about = described(arguments.dataset_id, env, None, None, arguments.format, metadata)
         with bar:
             dataset = export_dataset(

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from tiny_env import TableEnv, both_ways, lottery
 
 from irl_gym import counting
-from irl_gym.counting import Counting, interact
+from irl_gym.counting import Counting, Interaction, interact
 from irl_gym.datasets import read_minari, write_minari
-from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidParameter, NotDiscrete
+from irl_gym.errors import InvalidDemonstrations, InvalidDiscount, InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.tabulate import tabulate
 
 LAKE = "FrozenLake-v1"
@@ -193,12 +193,41 @@ def test_interact_refuses_counts_that_mean_nothing(steps, seed):
         interact(gym.make(LAKE), steps, seed=seed)
 
 
+class Raises(TableEnv):
+    def step(self, action):
+        raise RuntimeError("the floor is gone")
+
+
+class OldStep(TableEnv):
+    def step(self, action):
+        return super().step(action)[:4]
+
+
+class Nowhere(TableEnv):
+    def reset(self, **kwargs):
+        raise RuntimeError("nobody at home")
+
+
+@pytest.mark.parametrize(("kind", "message"), [(Raises, "floor is gone"), (OldStep, "unpack"), (Nowhere, "nobody at home")])
+def test_interaction_tells_an_error_of_the_environment_as_its_own(kind, message):
+    with pytest.raises(NotTabular, match=rf"the environment raised \w+ \(.*{message}"):
+        Interaction(steps=10).table(kind(both_ways(), [1, 0, 0]), 0.9)
+
+
+def test_error_of_a_counted_table_covers_its_first_states():
+    def starts(number):  # a state that is visited often, begun in by chance
+        return [episode([k % 10, *[k % 10] * 999], [0] * 999, terminated=False) for k in range(number)]
+
+    few, many = (counted(starts(n), 10, n_actions=1).table.evidence.error for n in (10, 200))
+    assert few == pytest.approx(np.sqrt(np.log(2 * 10 / 0.05) / 20)) and many < few / 2
+
+
 @pytest.mark.slow
 def test_a_million_steps_of_frozen_lake_are_counted_in_20_seconds():
     script = """
 import time
 import gymnasium as gym
-from irl_gym.counting import Counting, interact
+from irl_gym.counting import Counting, Interaction, interact
 env, begin = gym.make("FrozenLake-v1"), time.perf_counter()
 table = Counting().table(interact(env, 1_000_000, seed=0), env.observation_space, 4, gamma=0.99)
 print(time.perf_counter() - begin, table.mdp.n_states)

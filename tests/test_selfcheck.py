@@ -82,7 +82,7 @@ def test_self_check_catches_a_start_that_differs_from_the_published_one():
 
 def test_self_check_starts_walks_again_that_never_end():
     stays = [[[(1.0, 1, 0.0, False)], [(1.0, 2, 0.0, False)]], *([[(1.0, s, 0.0, False)]] * 2 for s in (1, 2))]
-    found = check(TableEnv(stays, [1, 0, 0]))
+    found = check(TableEnv(stays, [1, 0, 0]), steps=10_000)
     assert found.rows_seen == found.rows_total == 6
 
 
@@ -97,3 +97,21 @@ def test_self_check_makes_the_environment_again_when_it_has_a_spec():
     env = gym.make("FrozenLake-v1", is_slippery=False)
     env.unwrapped.lock = threading.Lock()
     assert isinstance(env.unwrapped, FrozenLakeEnv) and check(env).degrees == 0
+
+
+def test_self_check_walks_long_enough_to_meet_a_late_end():
+    class Late(TableEnv):
+        age = 0
+
+        def reset(self, **kwargs):
+            self.age = 0
+            return super().reset(**kwargs)
+
+        def step(self, action):
+            self.age += 1
+            observation, reward, *_ = super().step(action)
+            return observation, reward, self.age == 900, False, {}
+
+    with pytest.raises(TableMismatch, match=r"said terminated=True|to 0, terminated=True") as caught:
+        check(Late([[[(1.0, 0, 0.0, False)]]], [1]))
+    assert "outside the table" in str(caught.value) and "irl_gym.reveal.Reveal" in str(caught.value)

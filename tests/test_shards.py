@@ -1,10 +1,14 @@
-"""Episodes kept in shards come back, and a shard that was cut off is dropped."""
+"""Episodes kept in shards come back, and a damaged shard is set aside."""
+
+import errno
+from pathlib import Path
 
 import numpy as np
 import pytest
 from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.shards import Shards, size_of
 
 SPACE = spaces.Dict(b=spaces.Tuple((spaces.Discrete(9), spaces.MultiBinary(2))), a=spaces.Box(0, 1, (3,)))
@@ -44,11 +48,39 @@ def test_what_is_there_is_found_again(shards):
     assert [len(one) for one in again] == [3, 1, 2, 4] and (again.n_episodes, again.n_steps) == (4, 10)
 
 
-def test_a_broken_shard_is_dropped_with_those_after_it(shards):
-    first = shards.folder / "000000.npz"
-    first.write_bytes(first.read_bytes()[:100])
+def names(shards):
+    return sorted(path.name for path in shards.folder.iterdir())
+
+
+def flip(path):
+    """Change a byte of the rewards, as a disk may: the directory of the archive is whole."""
+    content = bytearray(path.read_bytes())
+    content[content.index(b"rewards.npy") + 150] ^= 255
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda path: path.write_bytes(path.read_bytes()[:100]), flip, lambda path: path.write_text("")]
+)
+def test_a_damaged_shard_is_set_aside_with_those_after_it(shards, damage):
+    damage(shards.folder / "000000.npz")
     again = Shards(shards.folder, SPACE)
-    assert (again.n_episodes, list(again), list(shards.folder.iterdir())) == (0, [], [])
+    assert (again.n_episodes, list(again), names(shards)) == (0, [], ["000000.npz.damaged", "000001.npz.damaged"])
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EACCES, errno.EIO])
+def test_a_shard_that_cannot_be_opened_now_costs_nothing(shards, monkeypatch, number):
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", lambda *_, **__: (_ for _ in ()).throw(OSError(number, "not now")))
+        with pytest.raises(InvalidParameter, match=r"000000.npz cannot be read now \(.*not now\)"):
+            Shards(shards.folder, SPACE)
+    assert names(shards) == ["000000.npz", "000001.npz"]
+
+
+def test_a_shard_damaged_while_it_is_read_is_named(shards):
+    flip(shards.folder / "000001.npz")
+    with pytest.raises(InvalidDemonstrations, match=r"shard .*000001.npz was damaged .* Ask for the same again"):
+        list(shards)
 
 
 def test_nothing_is_written_for_no_episodes(tmp_path):

@@ -238,3 +238,13 @@ def test_make_refuses_a_module_that_does_not_exist():
 
 def test_make_passes_arguments_on():
     assert make("FrozenLake-v1", map_name="8x8").observation_space.n == 64
+
+
+def test_make_refuses_text_where_true_or_false_is_expected():
+    with pytest.raises(InvalidParameter, match=r"is_slippery is 'flase': expected true or false"):
+        make("FrozenLake-v1", is_slippery="flase")
+
+
+def test_make_lists_the_arguments_when_one_is_unknown():
+    with pytest.raises(InvalidParameter, match=r"takes no argument 'fickle'.*fickle_passenger"):
+        make("Taxi-v4", fickle=True)

@@ -17,12 +17,22 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.errors import RunConflict
+from irl_gym.errors import EnumerationLimit, RunConflict
 from irl_gym.integer_spaces import keys_of_numbers, numbers_of_keys
 from irl_gym.rewards import UNREADABLE
 
 Script = tuple[int, ...]
 """Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
+
+COUNTED = {
+    "rows": "pairs (and starts) whose draws could not be enumerated",
+    "runs": "runs made of them in all",
+    "fewest": "runs made of one of them at least",
+    "lines": "lines that they gave",
+    "refusals": "calls that refused to be enumerated",
+    "uncompared": "inner states that were not compared, because their steps are counted",
+    "truncated": "steps that the environment itself truncated",
+}
 
 
 class Explored:
@@ -43,9 +53,8 @@ class Explored:
         self.first_line = array("q", [0])
         """Where the lines of each state begin, in the order of the numbers."""
         self.starts: dict[int, float] = {}
-        self.counted: dict[str, int] = {"rows": 0, "runs": 0, "fewest": 0, "lines": 0, "refusals": 0}
-        """Pairs (and starts) whose draws could not be enumerated, the runs made of them in all, and of one at least, the lines
-        they gave; and the calls that refused to be enumerated."""
+        self.counted: dict[str, int] = dict.fromkeys(COUNTED, 0)
+        """How often what happened, by the names of COUNTED."""
         self.always: tuple[str, ...] = ()
         """Attributes that belong to the inner state however large they are."""
         self.keys: list[Hashable] = []
@@ -130,6 +139,16 @@ class Explored:
         os.replace(beside, path)
 
 
+def too_large(explored: Explored, seconds: float, size: float, expected: str) -> EnumerationLimit:
+    """The error for a search that has met a limit, such as `max_states=10`."""
+    return EnumerationLimit(
+        f"the enumeration stopped at {len(explored.keys):,} states found, {explored.n_expanded:,} of them tried, after "
+        f"{seconds:.0f} s, at {size / 1e9:.2f} GB: expected at most {expected}. Raise it, as in `tabulate(env, "
+        f"gamma=..., by=Enumeration({expected.split('=')[0]}=...))`; with a `checkpoint` file it continues where "
+        "it stopped."
+    )
+
+
 def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dict[str, Any]) -> Explored:
     """What `Explored.save` wrote.
 
@@ -169,7 +188,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) 
         setattr(explored, name, array("d", found[name].astype(float).tolist()))
     explored.first_line = array("q", found["first_line"].tolist())
     explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
-    explored.counted = dict(json.loads(str(found["counted"])))
+    explored.counted |= dict(json.loads(str(found["counted"])))
     explored.always = tuple(json.loads(str(found["always"])))
     explored.settle()
     return explored

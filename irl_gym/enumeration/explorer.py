@@ -8,25 +8,25 @@ actions.
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import gymnasium as gym
 
-from irl_gym.enumeration.explored import Explored
-from irl_gym.enumeration.hidden_state import SAME, Behaviour, behaviour_of_lines, proof, shown, unlike
+from irl_gym.enumeration.deep_walks import walk_on
+from irl_gym.enumeration.explored import Explored, too_large
+from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proof, unlike
+from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.replays import Replays, another
-from irl_gym.enumeration.trials import MOST_REFUSALS, Outcomes, Trials
-from irl_gym.errors import EnumerationLimit, HiddenState, IrlGymError, NotTabular, UnknownObservation
+from irl_gym.enumeration.replays import Replays
+from irl_gym.enumeration.trials import Outcomes, Trials, shared_generators
+from irl_gym.errors import HiddenState, IrlGymError, NotTabular, UnknownObservation
 from irl_gym.integer_spaces import as_batch, checked_members, key_of, to_numbers
 
 CERTAIN = 1_000
 """Of the first states found, every one is tried again in other inner states; of later ones, each tenth."""
 MANY_STARTS = 100
 """First observations, counted, above which most have to come more than once: else they could not all be listed."""
-CHECKED = 20
-"""States of an earlier search that are tried again before it is continued."""
 
 Way = int | tuple[Any, int]
 """How an inner state was reached: as a state was found, by its number (-1: reset); or by another way and one more action."""
@@ -41,9 +41,13 @@ class Explorer:
         explored: where an earlier search stopped; None to begin.
         always: names of attributes that belong to the inner state however large they are.
         counting: count every random step, since draws do not tell all.
+        on_states: told the states tried and found while one call takes long.
     """
 
-    def __init__(self, env: gym.Env, limits: Limits, explored: Explored | None, always: frozenset[str], counting: bool):
+    def __init__(
+        self, env: gym.Env, limits: Limits, explored: Explored | None, always: frozenset[str], counting: bool,
+        on_states: Callable[[int, int], None] = lambda tried, found: None,
+    ):  # fmt: skip
         space: Any = env.action_space
         self.limits, self.n_actions = limits, int(space.n)
         self.space = env.observation_space
@@ -58,11 +62,18 @@ class Explorer:
         self._doubts: deque[tuple[int, Any, Way]] = deque()
         self._held = 0
         self.explored = explored or Explored(self.n_actions)
-        self._replays = Replays(self.explored, self.trials, self.space, self._key)
+        self.counted_rows: set[int] = set()
+        """Pairs (s, a) whose lines are counts, as far as this search knows; an earlier one did not keep them."""
+        self.known_from = 0 if explored is None or not explored.counted["rows"] else explored.n_expanded
+        """The first state of which that is known."""
+        self.replays = Replays(self.explored, self.trials, self.space, self.key)
+        self._on_states, self._began = on_states, time.monotonic()
         if explored is None:
+            self.trials.pulse = self._pulse
             self._begin()
         else:
             self._continue()
+            self._began, self.trials.pulse = time.monotonic(), self._pulse
 
     def expand(self) -> Iterator[None]:
         """Expand one state after the other, until none waits or a limit is reached.
@@ -72,17 +83,28 @@ class Explorer:
             HiddenState: one observation behaves in two ways.
             NotTabular: the environment raised an error.
         """
-        explored, began = self.explored, time.monotonic()
+        explored, shared = self.explored, shared_generators()
         while explored.n_expanded < len(explored.keys):
             number = explored.n_expanded
             state = self._waiting.pop(number)
             self._held -= _size(state)
             explored.expand(number, [line for action in range(self.n_actions) for line in self._row(number, state, action)])
+            before, shared = shared, shared_generators()
+            if shared != before:
+                self._suspect(state)
             self._doubts.extend(self._newcomers.pop(number, ()))
             while self._doubts:
                 self._compare(*self._doubts.popleft())
-            self._check_limits(time.monotonic() - began)
+            self._check_limits(time.monotonic() - self._began)
             yield
+        if not self.trials.counting and any(times >= self.limits.revisits for times in self._revisits.values()):
+            walk_on(self, time.monotonic() - self._began)
+
+    def _suspect(self, *states: Any) -> None:
+        """Is it the shared generators that decide what these inner states do?"""
+        for state in states:
+            for action in range(self.n_actions):
+                self.trials.suspect(self.trials.step(state, action))
 
     def _begin(self) -> None:
         seen = self.trials.outcomes(self.trials.reset(), -1, self._keep, runs=self.limits.start_runs)
@@ -102,9 +124,12 @@ class Explorer:
     def _row(self, number: int, state: Any, action: int) -> list[tuple[int, int, float, float]]:
         """The lines of one pair; new states are numbered."""
         found: dict[tuple[int, float], float] = {}
-        row = number * self.n_actions + action
+        row, truncated = number * self.n_actions + action, self.trials.truncated
         seen = self.trials.outcomes(self.trials.step(state, action), row, self._keep, runs=self.limits.runs)
         self._count(seen)
+        if seen.runs:
+            self.counted_rows.add(row)
+        self.explored.counted["truncated"] += self.trials.truncated > truncated
         for one in seen.all:
             (_, reward, terminated), (key, reached) = one.result, one.made
             successor = self.explored.end(key) if terminated else self._arrive(key, reached, one.script, number, action)
@@ -123,7 +148,7 @@ class Explorer:
     def _keep(self, result: tuple[Any, float, bool]) -> tuple[Any, Any]:
         """Key of an outcome, and its inner state where the observation is new or is doubted; None elsewhere."""
         observation, _, terminated = result
-        key = self._key(observation)
+        key = self.key(observation)
         number = self.explored.ids.get(key)
         if number is None and key not in self.explored.ends:
             checked_members(self.space, to_numbers(self.space, as_batch(self.space, observation)))
@@ -134,7 +159,8 @@ class Explorer:
         allowed = self.limits.revisits if number < CERTAIN or number % 10 == 0 else 0
         return self._arrivals.get(number, 0) < 4 * allowed and self._revisits.get(number, 0) < allowed
 
-    def _key(self, observation: Any) -> Any:
+    def key(self, observation: Any) -> Any:
+        """What an observation is known by."""
         try:
             return self._key_of(observation)
         except IrlGymError:
@@ -173,20 +199,34 @@ class Explorer:
         if self._revisits.get(number, 0) >= self.limits.revisits:
             return
         self._revisits[number] = self._revisits.get(number, 0) + 1
-        refusals, reached = self.trials.refusals, []
-        first, second = behaviour_of_lines(self.explored.lines_of(number)), self._behaviour(newcomer, reached)
-        self.trials.refusals = refusals
-        if second is None:
+        reached: list[tuple[int, int, Any]] = []
+        if not self.tell_apart(number, newcomer, lambda: self._actions(way), reached):
+            self.explored.counted["uncompared"] += 1
             return
         self.compared += 1
-        action = unlike(first, second)
-        if action is not None:
-            differ = self.trials.snapshots.differences(self._replays.state(number), newcomer)
-            raise HiddenState(proof(self.explored, self.space, number, action, first, second, self._actions(way), differ))
         for after, taken, state in reached:
             self._doubt(after, state, (way, taken))
 
-    def _behaviour(self, state: Any, reached: list[tuple[int, int, Any]], number: int | None = None) -> Behaviour | None:
+    def tell_apart(self, number: int, newcomer: Any, way: Callable[[], list[int]], reached: list[tuple[int, int, Any]]) -> bool:
+        """Can a state be compared with another inner state? That it then does the same is made sure of.
+
+        Raises:
+            HiddenState: it does something else.
+        """
+        refusals = self.trials.refusals
+        first, second = behaviour_of_lines(self.explored.lines_of(number)), self.behaviour(newcomer, reached)
+        self.trials.refusals = refusals
+        if second is None:
+            return False
+        action = unlike(first, second)
+        if action is not None:
+            found = self.replays.state(number)
+            self._suspect(found, newcomer)
+            differ = self.trials.snapshots.differences(found, newcomer)
+            raise HiddenState(proof(self.explored, self.space, number, action, first, second, way(), differ))
+        return True
+
+    def behaviour(self, state: Any, reached: list[tuple[int, int, Any]], number: int | None = None) -> Behaviour | None:
         """What an inner state does; None where that has to be counted, and no `number` says with which seeds.
 
         The inner states that follow are added to `reached`: number, action, state.
@@ -218,57 +258,30 @@ class Explorer:
         limits, explored = self.limits, self.explored
         if explored.n_expanded == len(explored.keys) <= limits.max_states:
             return
-        size = explored.size + self._held
         expected = None
         if len(explored.keys) > limits.max_states:
             expected = f"max_states={limits.max_states:,}"
         elif limits.max_seconds is not None and seconds > limits.max_seconds:
             expected = f"max_seconds={limits.max_seconds:g}"
-        elif size > limits.max_bytes:
+        elif explored.size + self._held > limits.max_bytes:
             expected = f"max_bytes={limits.max_bytes:.3g}"
         if expected is not None:
-            raise EnumerationLimit(
-                f"the enumeration stopped at {len(explored.keys):,} states found, {explored.n_expanded:,} of them tried, after "
-                f"{seconds:.0f} s, at {size / 1e9:.2f} GB: expected at most {expected}. Raise it, as in `tabulate(env, "
-                f"gamma=..., by=Enumeration({expected.split('=')[0]}=...))`; with a `checkpoint` file it continues where "
-                "it stopped."
-            )
+            raise too_large(explored, seconds, explored.size + self._held, expected)
 
-    # An earlier search is continued from the inner states that its paths lead to.
+    def _pulse(self) -> None:
+        """Within a call that takes long: tell, and look at the clock."""
+        explored, limits, seconds = self.explored, self.limits, time.monotonic() - self._began
+        self._on_states(explored.n_expanded, len(explored.keys))
+        if limits.max_seconds is not None and seconds > limits.max_seconds:
+            raise too_large(explored, seconds, explored.size + self._held, f"max_seconds={limits.max_seconds:g}")
 
     def _continue(self) -> None:
-        self._check_kept()
-        states = self._replays.waiting()
+        """Go on with an earlier search, from the inner states that its paths lead to."""
+        check_kept(self)
+        states = self.replays.waiting()
         self._waiting = {number: state for number, state in states.items() if number >= self.explored.n_expanded}
         self._marks = {number: (_mark(state),) for number, state in states.items()}
         self._held = sum(map(_size, self._waiting.values()))
-
-    def _check_kept(self) -> None:
-        """Does the environment still do what is kept, at a reset and in some states? Nothing is changed by asking.
-
-        Raises:
-            RunConflict: it does something else, as the same class with other arguments would.
-        """
-        explored, trials = self.explored, self.trials
-        seen = trials.outcomes(trials.reset(), -1, lambda result: self._key(result[0]), runs=self.limits.start_runs)
-        starts: dict[int | None, float] = {}
-        for one in seen.all:
-            number = explored.ids.get(one.made)
-            starts[number] = starts.get(number, 0.0) + one.probability
-        if starts.keys() != explored.starts.keys() or any(abs(p - explored.starts[s or 0]) > SAME for s, p in starts.items()):
-            raise another("begins otherwise than the environment does now")
-        for number in sorted({i * (explored.n_expanded - 1) // (CHECKED - 1) for i in range(CHECKED)} - {-1}):
-            state, kept = self._replays.state(number), behaviour_of_lines(explored.lines_of(number))
-            if not any(self._kept(number, state, kept, refusals) for refusals in (0, MOST_REFUSALS)):
-                raise another(
-                    f"goes on from {shown(self.space, explored.keys[number])} otherwise than the environment does now"
-                )
-        trials.refusals = explored.counted["refusals"]
-
-    def _kept(self, number: int, state: Any, kept: Behaviour, refusals: int) -> bool:
-        self.trials.refusals = refusals
-        again = self._behaviour(state, [], number)
-        return again is not None and unlike(kept, again) is None
 
 
 def _mark(state: Any) -> int:

@@ -43,6 +43,10 @@ GUARDED = 500
 class Enumeration(Limits):
     """How the states of an environment are enumerated.
 
+    State that the observation hides is searched for, not excluded: observations are tried again in `revisits` other inner
+    states, and where these were not enough to see all of them, random walks are compared with the table. What takes longer
+    than these, or a rare order of actions, is not found.
+
     Raises:
         InvalidParameter: a field outside its range.
     """
@@ -95,7 +99,7 @@ class Enumeration(Limits):
             try:
                 own = without_watchers(env)
                 called(lambda own=own: own.reset(seed=self.seed))
-                explorer = Explorer(own, self, explored, always, counting)
+                explorer = Explorer(own, self, explored, always, counting, on_states)
                 explorer.explored.counted["outside"] = int(counting)
                 explorer.explored.always = tuple(sorted(always))
                 explorer.explored.settle()
@@ -212,6 +216,7 @@ def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
     method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
     if not counted:
         method += f", with every outcome of its draws; {compared:,} states were met in other inner states and did the same."
+        method += _left_out(explored)
         return Evidence(method, exact=True, merged=0, split=split, check=None)
     mean_runs = explored.counted["runs"] / counted
     # Hoeffding's inequality, for all counted probabilities at once.
@@ -220,4 +225,15 @@ def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
         f"; {counted:,} step(s) or reset(s) whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
         f"probabilities within {error:.3f}, all at once, with 95 % confidence."
     )
+    if explored.counted["uncompared"]:
+        method += " Hidden state was not looked for in counted steps."
+    method += _left_out(explored)
     return Evidence(method, exact=False, merged=0, split=split, check=None, error=error)
+
+
+def _left_out(explored: Explored) -> str:
+    """What the environment did that a table cannot hold."""
+    truncated = explored.counted["truncated"]
+    if not truncated:
+        return ""
+    return f" The environment truncated {truncated:,} step(s) itself; truncation is not part of a table."

@@ -8,7 +8,7 @@ import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -23,6 +23,10 @@ REPLAYED = 50
 """Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
 SUSPECTED = 25
 """Times that it is made again where the generators that NumPy and Python share were drawn from, be it by the environment."""
+SUSPECTS = 500
+"""So many outcomes of calls in which the shared generators moved are all made again so often; of later ones, each fiftieth."""
+PULSE = 256
+"""Runs of a call between two looks at the clock."""
 MOST_REFUSALS = 5
 """Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
 ROUNDING = 1e-12
@@ -30,6 +34,7 @@ ROUNDING = 1e-12
 Result = tuple[Any, float, bool]
 """Observation, reward, terminated."""
 Call = Callable[[], Result]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,11 @@ class Trials:
         self.fresh = self.snapshots.take()
         self.refusals = 0
         """Calls so far that could not be enumerated."""
-        self._calls = 0
+        self.truncated = 0
+        """Steps so far that the environment itself truncated."""
+        self.pulse: Callable[[], None] = lambda: None
+        """Called now and then while a call is run many times; it may raise."""
+        self._calls = self._suspects = 0
 
     def reset(self) -> Call:
         """A reset, as a call."""
@@ -91,7 +100,8 @@ class Trials:
 
         def run() -> Result:
             self.snapshots.restore(state)
-            observation, reward, terminated, _, _ = self.env.step(action + self.first_action)
+            observation, reward, terminated, truncated, _ = self.env.step(action + self.first_action)
+            self.truncated += bool(truncated)
             return observation, float(reward), bool(terminated)
 
         return run
@@ -106,20 +116,42 @@ class Trials:
         self._calls += 1
         if not self.counting:
             checked = self._calls <= 2 * REPLAYED or self._calls % REPLAYED == 0
-            before = _shared_generators() if checked else None
+            before = shared_generators() if checked else None
             try:
                 found = self._enumerated(call, make)
                 if found is not None:
                     if checked:
-                        self._check(found[-1], call, SUSPECTED if _shared_generators() != before else 1)
+                        self._check(found[-1], call, SUSPECTED if shared_generators() != before else 1)
                     return Outcomes(found, 0)
             except NotEnumerable:
                 self.refusals += 1
         found = []
         for i in range(runs):
+            if i % PULSE == PULSE - 1:
+                self.pulse()
             result = self.again(call, row, (-1, i))
             found.append(Outcome(1 / runs, (-1, i), result, make(result)))
         return Outcomes(found, runs)
+
+    def suspect(self, call: Call) -> None:
+        """Make each outcome of a call again, many times where it moves the generators that NumPy and Python share.
+
+        Raises:
+            OutsideRandomness: the same draws did not give the same.
+        """
+        if self.counting:
+            return
+        try:
+            found = self._enumerated(call, lambda _: None) or []
+        except NotEnumerable:
+            return  # it is counted
+        for one in found:
+            before = shared_generators()
+            self._check(one, call, 1)
+            if shared_generators() != before:
+                self._suspects += 1
+                if self._suspects <= SUSPECTS or self._suspects % REPLAYED == 0:
+                    self._check(one, call, SUSPECTED)
 
     def again(self, call: Call, row: int, script: Script) -> Result:
         """The outcome of a script."""
@@ -128,8 +160,12 @@ class Trials:
         seed = [self.limits.seed, row + 1, script[1]]
         if not self.counting:
             return called(lambda: self.draws.seeded(seed, call))
+        return self.seeded(seed, call)
+
+    def seeded(self, seed: list[int], run: Callable[[], T]) -> T:
+        """Run with real random numbers, also of the generators that NumPy and Python share."""
         with _seeded_globals(seed):
-            return called(lambda: self.draws.seeded(seed, call))
+            return called(lambda: self.draws.seeded(seed, run))
 
     def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
         """All outcomes; None for a random call after others had too many."""
@@ -137,6 +173,8 @@ class Trials:
         while (one := called(lambda: next(outcomes, None))) is not None:
             probability, script, result = one
             found.append(Outcome(probability, script, result, make(result)))
+            if len(found) % PULSE == 0:
+                self.pulse()
             if self.refusals >= MOST_REFUSALS and probability < 1:
                 return None
         return found
@@ -175,7 +213,7 @@ def _same(a: Any, b: Any) -> bool:
     return np.array_equal(np.asarray(a), np.asarray(b))
 
 
-def _shared_generators() -> tuple[Any, ...]:
+def shared_generators() -> tuple[Any, ...]:
     """The state of the generators that NumPy and Python share."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 (theirs, not ours)
     return random.getstate(), name, np.asarray(keys).tobytes(), *rest

@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.imports.cutting import counts_of, cut, depth, from_lists, from_padded
+from irl_gym.imports.cutting import counts_of, cut, depth, first_part, from_lists, from_padded
 from irl_gym.imports.expected import expect
 from irl_gym.imports.members import as_array, is_list, numbers
 from irl_gym.imports.rows import Last
@@ -52,7 +52,8 @@ def from_arrays(
     Args:
         observations: members of the space; for a Tuple or Dict space lists of them, or a tuple or dictionary of arrays.
         actions: whole numbers.
-        rewards: laid out like `actions`; 0.0 where they are not known, which no learner reads.
+        rewards: laid out like `actions`; 0.0 where they are not known: no learner reads them, but a report on such a dataset
+            cannot say what the expert earned.
         terminated: did the environment end it? One boolean, (N,) booleans, or laid out like `actions`.
         truncated: did a time limit? An episode that is neither counts as truncated: its log stops.
         next_observations: laid out like `actions`; what each step led to.
@@ -81,6 +82,8 @@ def from_arrays(
         raise InvalidDemonstrations(f"the actions are {type(actions).__name__}: expected an array, or a list of arrays.")
     if len(actions) == 0:
         raise InvalidDemonstrations("there are no rows: expected at least one step.")
+    if isinstance(actions, np.ndarray) and actions.shape[1:] == (1,) and len(actions) > 1 and not named:
+        actions = _of_column(expected.space, observations, actions)
     if isinstance(actions, np.ndarray) and actions.ndim == 2 and ends is None and episode is None:
         counts = np.full(len(actions), actions.shape[1]) if lengths is None else counts_of(lengths)
         if len(counts) == len(actions):
@@ -90,6 +93,24 @@ def from_arrays(
     n = len(actions)
     offsets = _offsets(n, ends, lengths, episode, terminated, truncated)
     return cut(expected, observations, actions, columns, offsets, last, lambda row: f"row {row} (from 0)")
+
+
+def _of_column(space: spaces.Space, observations: Any, actions: np.ndarray) -> np.ndarray:
+    """Actions (n, 1) as (n,) where the observations beside them are one long array, and as they are where they are padded.
+
+    Raises:
+        InvalidDemonstrations: nothing tells a column of n steps from n episodes of a step.
+    """
+    n, part = len(actions), np.shape(as_array(first_part(observations), "observations"))
+    while isinstance(space, spaces.Tuple | spaces.Dict):
+        space = next(iter(space.values() if isinstance(space, spaces.Dict) else space))
+    shape = space.shape or ()
+    if part == (n, 1, *shape):
+        raise InvalidDemonstrations(
+            f"the actions have shape ({n}, 1) and the observations {part}: expected to know whether these are {n} steps or {n} "
+            f"episodes of a step. Give actions[:, 0] for steps, or lengths=[1] * {n} for episodes."
+        )
+    return actions[:, 0] if part == (n, *shape) else actions
 
 
 def _offsets(n: int, ends: Any, lengths: Any, episode: Any, terminated: Any, truncated: Any) -> np.ndarray:

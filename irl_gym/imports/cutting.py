@@ -62,7 +62,7 @@ def cut(
     n, N = int(offsets[-1]), len(offsets) - 1
     flags = ("terminated", "truncated")
     columns = {key: _rowwise(key, value, offsets) if key in flags else value for key, value in columns.items()}
-    part = _first_part(observations)
+    part = first_part(observations)
     complete = columns.get("next_observations") is None and is_list(part) and len(part) == n + N
     if not complete:
         return Rows(expected, observations, actions, offsets, name or steps_of(offsets, noun), last=last, **columns).episodes()
@@ -117,7 +117,7 @@ def from_padded(
         )
     reading = np.arange(longest) < counts[:, None]
     offsets = np.concatenate([[0], np.cumsum(counts)])
-    complete = as_array(_first_part(observations), "observations").shape[1:2] == (longest + 1,)
+    complete = as_array(first_part(observations), "observations").shape[1:2] == (longest + 1,)
     seen = _unpadded("observations", observations, np.arange(longest + 1) < counts[:, None] + 1 if complete else reading)
     flat = dict(columns)
     for key, value in flat.items():
@@ -178,7 +178,8 @@ def from_lists(
     return cut(expected, _joined(batches), flat.pop("actions"), flat, offsets, last, noun=noun)
 
 
-def _first_part(batch: Any) -> Any:
+def first_part(batch: Any) -> Any:
+    """An array of a batch that may be a tuple or dictionary of them."""
     while isinstance(batch, Mapping | tuple) and len(batch):
         batch = next(iter(batch.values())) if isinstance(batch, Mapping) else batch[0]
     return batch

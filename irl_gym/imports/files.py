@@ -96,7 +96,8 @@ def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str]) ->
             continue
         if column in there:
             raise InvalidDemonstrations(f"{where} has {list(there).count(column)} columns {column!r}: expected one.")
-        close = get_close_matches(column, map(str, there), 1, 0.5)
+        taken = {other for key, other in columns.items() if key != role}
+        close = get_close_matches(column, [str(one) for one in there if one not in taken], 1, 0.5)
         mend = f"Did you mean {role}={close[0]!r}?" if close else f"Name the right one with {role}=..."
         raise InvalidDemonstrations(
             f"{where} has no column {column!r}: expected it for {role}, among the columns {[str(one) for one in there]}. {mend}"

@@ -60,7 +60,8 @@ def from_frame(
         step: its rows are sorted by it; it goes up by 1 from any number. None: they are in order.
         observation: what was seen before the action.
         action: whole numbers.
-        reward: 0.0 where there is none, which no learner reads.
+        reward: 0.0 where there is none: no learner reads them, but a report on such a dataset cannot say what the expert
+            earned.
         terminated: true in the last row of an episode that the environment ended. An episode without counts as truncated.
         truncated: true in the last row of an episode that a time limit ended.
         next_observation: like `observation`: what was seen after the action.
@@ -151,9 +152,11 @@ def _order(columns: dict[str, np.ndarray], n: int, name: Name) -> tuple[np.ndarr
         steps = numbers(columns["step"], "step", name)
         if steps.ndim > 1:
             raise InvalidDemonstrations("the column of steps holds lists: expected whole numbers.")
-        wrong = np.flatnonzero(~(np.isfinite(steps) & (steps == np.floor(steps))))
+        wrong = np.flatnonzero(~((steps > -(2**53)) & (steps < 2**53) & (steps == np.floor(steps))))
         if wrong.size:
-            raise InvalidDemonstrations(f"{name(int(wrong[0]))} has step {steps[wrong[0]].item()}: expected a whole number.")
+            raise InvalidDemonstrations(
+                f"{name(int(wrong[0]))} has step {steps[wrong[0]].item()}: expected a whole number between -2^53 and 2^53."
+            )
         order = np.lexsort((steps, codes))
     codes = codes[order]
     same = codes[1:] == codes[:-1]

@@ -14,9 +14,10 @@ from gymnasium import spaces
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.imports.expected import Expected, expect
-from irl_gym.imports.rows import Last, Rows, check_last
+from irl_gym.imports.rows import Last, Rows, check_last, truths
 
 FIELDS = ("observation", "action", "reward", "episode", "terminated", "truncated")
+FLAGS = FIELDS[4:]
 
 
 def from_pairs(
@@ -74,12 +75,13 @@ def _episodes(pairs: Iterable[Any], fields: tuple[str, ...] | None, last: Last, 
         step = _step(pair, fields, number)
         final = step["action"] is None
         follows = bool(steps) and step.get("episode") == steps[-1].get("episode")
+        ended = any(truths([step[key]], key, lambda _, n=number: _name(n))[0] for key in FLAGS if step.get(key) is not None)
         if steps and (not follows or (closed and not final and "episode" not in step)):
             yield _episode(steps, first, last, expected)
             steps = []
         first = first if steps else number
         steps.append(step)
-        closed = bool(step.get("terminated") or step.get("truncated"))
+        closed = ended
         if final:
             yield _episode(steps, first, "row", expected)
             steps, closed = [], False
@@ -94,8 +96,18 @@ def _step(pair: Any, fields: tuple[str, ...] | None, number: int) -> dict[str, A
     known = isinstance(pair, tuple | list) and (len(pair) == len(names) or (fields is None and len(pair) == 2))
     if not known:
         also = " or (observation, action)" if fields is None else ""
-        raise InvalidDemonstrations(f"pair {number} (from 0) is {pair!r}: expected ({', '.join(names)}){also}.")
-    return dict(zip(names, pair, strict=False))
+        raise InvalidDemonstrations(f"{_name(number)} is {pair!r}: expected ({', '.join(names)}){also}.")
+    step = dict(zip(names, pair, strict=False))
+    episode = step.get("episode")
+    try:
+        bool(episode == episode)  # an array cannot say whether it is the one before
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise InvalidDemonstrations(f"{_name(number)} has episode {episode!r}: expected one number or name.") from error
+    return step
+
+
+def _name(number: int) -> str:
+    return f"pair {number} (from 0)"
 
 
 def _episode(steps: list[dict[str, Any]], first: int, last: Last, expected: Expected) -> Episode:
@@ -108,7 +120,7 @@ def _episode(steps: list[dict[str, Any]], first: int, last: Last, expected: Expe
         return values
 
     def name(row: int) -> str:
-        return f"pair {first + row} (from 0)"
+        return _name(first + row)
 
     for key in ("reward", "terminated", "truncated"):
         values = column(key, 0)

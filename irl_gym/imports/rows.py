@@ -7,7 +7,8 @@ but the person who imports can tell which; `last` says it:
 
     next observations given   nothing is missing: the episode has every row's pair and ends in the last next observation
     last="drop", the default  the last action of an episode, whose successor is unknown, is left out. Nothing is invented: all
-                              that is kept was seen. It costs one pair an episode
+                              that is kept was seen. It costs one pair an episode, and what that pair paid: often all there is,
+                              as FrozenLake pays at the end. Where rewards matter, give next observations or "repeat"
     last="repeat"             every pair is kept, and the last observation stands in for its unknown successor. A policy may be
                               estimated from such an episode; a table of transitions should not be
     last="row"                the last row of an episode is its last observation, and its action and reward are not read
@@ -77,7 +78,8 @@ class Rows:
     name: Name
     """Says where a row stands."""
     rewards: Any = None
-    """(n,); None where the log has none: then they are 0.0, which no learner reads."""
+    """(n,); None where the log has none: then they are 0.0. No learner reads them; a report on such a dataset cannot say what
+    the expert earned."""
     terminated: Any = None
     """(n,) booleans."""
     truncated: Any = None
@@ -185,7 +187,7 @@ class Rows:
         if wrong.size:
             raise InvalidDemonstrations(
                 f"{self.name(int(wrong[0]))} has reward {array[wrong[0]]}: expected a finite number. Leave the rewards out if "
-                "they are not known; none of the learners reads them."
+                "they are not known; no learner reads them."
             )
         return array
 

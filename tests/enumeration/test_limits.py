@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,41 @@ def test_250_000_states_of_plain_python_take_less_than_120_seconds_and_4_gb():
     states, seconds, gigabytes = json.loads(done.stdout)
     print(f"{seconds:.1f} s, {gigabytes:.2f} GB")
     assert states == 250_000 and seconds < 120 and gigabytes < 4
+
+
+class Dice(Board):
+    """Rolls five dice at once, slowly."""
+
+    def __init__(self, at):
+        super().__init__(4)
+        self.at = at
+
+    def roll(self):
+        time.sleep(0.0005)
+        self.x = int(self.np_random.integers(8, size=5).sum()) // 36
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        if self.at == "reset":
+            self.roll()
+        return self._seen(), {}
+
+    def step(self, action):
+        if self.at == "step":
+            self.roll()
+        return self._seen(), 0.0, False, False, {}
+
+
+@pytest.mark.parametrize("at", ["reset", "step"])
+def test_the_clock_is_looked_at_and_told_within_a_call_of_many_outcomes(at):
+    told = []
+    with pytest.raises(EnumerationLimit, match=r"after 0 s.*max_seconds=0\.1"):
+        Enumeration(max_seconds=0.1, most_outcomes=40_000).table(Dice(at), 0.9, lambda *counts: told.append(counts))
+    assert told
+
+
+@pytest.mark.parametrize("runs", [{"runs": 10_000}, {"start_runs": 10_000}])
+def test_the_clock_is_looked_at_within_a_call_that_is_counted(runs):
+    with pytest.raises(EnumerationLimit, match=r"after 0 s.*max_seconds=0\.1"):
+        at = "step" if "runs" in runs else "reset"
+        Enumeration(max_seconds=0.1, most_outcomes=10, **runs).table(Dice(at), 0.9)

@@ -186,3 +186,57 @@ def test_a_difference_inside_a_large_observation_is_noticed():
     np.random.seed(0)  # noqa: NPY002
     table = table_of(Picture())
     assert not table.evidence.exact and table.mdp.n_states == 2
+
+
+class RareLeaf(Corridor):
+    """Past its hundred cells, one draw comes from outside its own generator."""
+
+    def __init__(self):
+        super().__init__(200)
+
+    def step(self, action):
+        if self.cell == 3 and action:
+            return self.moved(int(np.random.rand() < 0.5))  # noqa: NPY002
+        return self.moved(int(action))
+
+
+def test_a_draw_from_outside_in_one_rare_leaf_is_noticed():
+    np.random.seed(0)  # noqa: NPY002
+    table = table_of(RareLeaf())
+    assert not table.evidence.exact and table.mdp.P[[3 * 2 + 1]].toarray()[0, 2] == pytest.approx(0.5, abs=0.15)
+
+
+class Draws(Corridor):
+    """Draws from outside in every step, harmlessly."""
+
+    def step(self, action):
+        np.random.rand()  # noqa: NPY002
+        return self.moved(int(action))
+
+
+def test_a_draw_from_outside_that_never_matters_leaves_the_table_exact():
+    assert table_of(Draws()).evidence.exact
+
+
+def test_counted_steps_that_were_not_compared_are_told():
+    class Ages(Slippery):
+        age = 0
+
+        def step(self, action):
+            self.age += 1
+            return super().step(action)
+
+    assert "Hidden state was not looked for in counted steps." in table_of(Ages("normal")).evidence.method
+    assert "Hidden" not in table_of(Ages("generator")).evidence.method
+
+
+class Truncates(Corridor):
+    def step(self, action):
+        *most, _, info = self.moved(int(action))
+        return *most, self.cell == 0, info
+
+
+def test_a_truncation_of_the_environments_own_is_told():
+    method = table_of(Truncates()).evidence.method  # from cells 0 and 1 to the left
+    assert "The environment truncated 2 step(s) itself; truncation is not part of a table." in method
+    assert "truncat" not in table_of(Corridor()).evidence.method

@@ -71,6 +71,23 @@ def test_a_rectangle_needs_no_lengths():
     assert seen(episodes) == [([0, 4, 8], [1, 1], False, True), ([0, 1, 2], [2, 2], False, True)]
 
 
+def test_a_column_of_actions_beside_one_long_array_is_one():
+    column = np.array([[1], [1], [2]])
+    flags = {"terminated": [False, True, False], "next_observations": [4, 8, 1]}
+    assert seen(from_arrays(np.array([0, 4, 0]), column, **flags, **LAKE)) == WHOLE
+
+
+def test_columns_that_may_be_episodes_of_a_step_are_refused():
+    columns = np.array([[0], [4]]), np.array([[1], [1]])
+    with pytest.raises(InvalidDemonstrations, match=r"shape \(2, 1\) .* Give actions\[:, 0\] for steps, or lengths=\[1\] \* 2"):
+        from_arrays(*columns, terminated=[False, True], last="repeat", **LAKE)
+    assert [len(one) for one in from_arrays(*columns, lengths=[1, 1], last="repeat", **LAKE)] == [1, 1]
+
+
+def test_padded_episodes_of_a_step_stay_so():
+    assert len(from_arrays(np.array([[0, 4], [0, 1]]), np.array([[1], [2]]), terminated=[True, False], **LAKE)) == 2
+
+
 def test_drop_leaves_out_the_last_action_and_the_end_it_made():
     episodes = from_arrays([[0, 4, 8], [0, 1]], [[1, 1, 3], [2, 0]], rewards=[[1, 2, 3], [4, 5]], terminated=True, **LAKE)
     assert seen(episodes) == [([0, 4, 8], [1, 1], False, True), ([0, 1], [2], False, True)]

@@ -178,6 +178,16 @@ def test_two_columns_of_one_name_are_refused(log):
         from_frame(frame, **LAKE)
 
 
+def test_a_column_in_use_is_not_offered_for_another(log):
+    with pytest.raises(InvalidDemonstrations, match=r"no column 'action'.* Name the right one with action="):
+        from_frame(log(LOG.replace("action", "move")), **LAKE)
+
+
+def test_a_step_too_large_to_count_is_refused(log):
+    with pytest.raises(InvalidDemonstrations, match=r"row 2 \(line 3 of log.csv\) has step 1e\+300: expected a whole number"):
+        from_frame(log(LOG.replace("0,1,4", "0,1e300,4")), **LAKE)
+
+
 def test_an_empty_frame_is_refused(log):
     with pytest.raises(InvalidDemonstrations, match="there are no rows"):
         from_frame(pd.read_csv(log())[:0], **LAKE)

@@ -97,6 +97,23 @@ def test_an_episode_that_goes_on_after_its_end_is_refused():
         list(from_pairs(rows, fields=("episode", "observation", "action", "terminated"), **LAKE))
 
 
+def test_flags_may_be_text():
+    rows = [(0, 1, "False"), (4, 1, "false"), (8, 1, "True"), (0, 2, "False"), (1, 1, "False")]
+    episodes = from_pairs(rows, fields=("observation", "action", "terminated"), last="repeat", **LAKE)
+    assert [len(one) for one in episodes] == [3, 2]
+
+
+def test_a_flag_that_is_no_boolean_is_named():
+    with pytest.raises(InvalidDemonstrations, match=r"pair 1 \(from 0\) has truncated 'maybe'"):
+        list(from_pairs([(0, 1, False), (4, 1, "maybe")], fields=("observation", "action", "truncated"), **LAKE))
+
+
+def test_an_array_as_episode_is_refused():
+    rows = [(np.array([1, 2]), 0, 1), (np.array([1, 2]), 4, 1)]
+    with pytest.raises(InvalidDemonstrations, match=r"pair 0 \(from 0\) has episode array.*expected one number or name"):
+        list(from_pairs(rows, fields=("episode", "observation", "action"), **LAKE))
+
+
 @pytest.mark.parametrize("fields", [("observation",), ("observation", "action", "colour"), ("observation", "action", "action")])
 def test_unknown_fields_are_refused_at_once(fields):
     with pytest.raises(InvalidParameter, match="fields are"):

@@ -49,6 +49,7 @@ def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
         (("--dataset-id", "no version"), "InvalidParameter: dataset id 'no version' is malformed"),
         (("--episodes", "0"), "InvalidParameter: episodes is 0"),
         (("--env-id", "FrozenLaek-v1"), "UnknownEnvironment: environment 'FrozenLaek-v1'"),
+        (("--reveal", "colour"), "InvalidParameter: reveal has 'colour'"),
         (("--env-id", "CartPole-v1", "--env-kwargs", "{}"), "Or choose ppo, dqn or a2c"),
     ],
 )
@@ -56,6 +57,22 @@ def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, arguments, s
     made = run(*LAKE, "--root", str(tmp_path), *arguments)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_known_to_be_hidden_is_revealed(tmp_path, opened):
+    taxi = ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--dataset-id", ID, "--root", str(tmp_path))
+    made = run(*taxi, "--episodes", "3")
+    assert made.returncode == 0, made.stderr
+    assert set(opened(tmp_path).recover_environment().observation_space.spaces) == {"observation", "fickle_step"}
+    hidden = run(*taxi, "--episodes", "3", "--dataset-id", "lake/hidden-v0", "--reveal", "none")
+    assert hidden.returncode == 2 and "HiddenState" in hidden.stderr
+
+
+def test_layouts_are_drawn_from_the_seeds_named(tmp_path, opened):
+    made = run(*LAKE, "--start-seeds", "0", "--episodes", "3", "--root", str(tmp_path))
+    assert made.returncode == 0, made.stderr
+    (wrapper,) = opened(tmp_path).env_spec.additional_wrappers
+    assert wrapper.name == "SeededStarts" and list(wrapper.kwargs["seeds"]) == [0]
 
 
 def test_a_taken_id_is_refused(tmp_path):

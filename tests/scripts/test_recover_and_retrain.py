@@ -60,7 +60,7 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
         (
             ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--reveal", "none"),
-            "HiddenState: Taxi-v4 has no table: observation",
+            "HiddenState: no table of Taxi-v4: observation",
         ),
         (("--expert", "pppo"), "InvalidParameter: expert is 'pppo': expected one of value-iteration, ppo"),
         (("--expert", "agent.zip"), "InvalidParameter: expert is 'agent.zip', which is no file"),

@@ -9,7 +9,15 @@ from stable_baselines3 import PPO
 
 from irl_gym import demonstrators
 from irl_gym.demonstrators import NAMED, Drawn, Recording, Stepped
-from irl_gym.errors import DatasetMismatch, InvalidDiscount, InvalidParameter, InvalidPolicy, NotDiscrete, NotTabular
+from irl_gym.errors import (
+    DatasetMismatch,
+    EnumerationLimit,
+    InvalidDiscount,
+    InvalidParameter,
+    InvalidPolicy,
+    NotDiscrete,
+    NotTabular,
+)
 
 
 def made(folder, env_id="FrozenLake-v1", expert="value-iteration", **kwargs):
@@ -99,6 +107,13 @@ def test_planning_without_a_table_says_what_needs_none(tmp_path, env_id, error):
         assert env_id == "Blackjack-v1"  # a table of it may be made by now
 
 
+def test_an_enumeration_stops_at_the_states_allowed(tmp_path):
+    env = gym.wrappers.ClipReward(gym.make("FrozenLake-v1", is_slippery=False), 0, 1)  # no table is known of it
+    with pytest.raises(EnumerationLimit, match="Or choose ppo, dqn or a2c"):
+        Recording("value-iteration", 0.9, max_states=5).demonstrator(env, tmp_path)
+    assert isinstance(Recording("value-iteration", 0.9, max_states=16).demonstrator(env, tmp_path), Drawn)
+
+
 def test_continuous_actions_are_refused(tmp_path):
     with pytest.raises(NotDiscrete, match="DiscretizeAction"):
         made(tmp_path, "Pendulum-v1", "random")
@@ -117,6 +132,7 @@ def test_episodes_are_cut_at_the_limit(tmp_path):
         ({"epsilon": 1.5}, InvalidParameter),
         ({"seed": -1}, InvalidParameter),
         ({"max_episode_steps": 0}, InvalidParameter),
+        ({"max_states": 0}, InvalidParameter),
     ],
 )
 def test_a_wrong_field_is_refused(wrong, error):

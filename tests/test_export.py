@@ -122,6 +122,16 @@ def test_an_export_that_was_cut_off_ends_the_same(cut_off, tmp_path_factory):
     assert files[0].read_bytes() == files[2].read_bytes() and files[1].read_bytes() == files[3].read_bytes()
 
 
+def test_a_damaged_shard_and_those_after_it_are_made_again(cut_off, tmp_path_factory):
+    (damaged,) = cut_off.glob(".exporting-*/shards/000002.npz")
+    stored = bytearray(damaged.read_bytes())
+    stored[stored.index(b"rewards.npy") + 150] ^= 255
+    damaged.write_bytes(stored)
+    straight, rest = tmp_path_factory.mktemp("straight"), Numbered()
+    run(straight), run(cut_off, rest)
+    assert rest.asked == [2, 3, 4, 5, 6] and content(cut_off) == content(straight)
+
+
 def test_what_is_under_way_is_no_dataset(cut_off):
     with minari_root(cut_off):
         assert not minari.list_local_datasets()

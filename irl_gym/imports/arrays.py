@@ -52,8 +52,8 @@ def from_arrays(
     Args:
         observations: members of the space; for a Tuple or Dict space lists of them, or a tuple or dictionary of arrays.
         actions: whole numbers.
-        rewards: laid out like `actions`; 0.0 where they are not known: no learner reads them, but a report on such a dataset
-            cannot say what the expert earned.
+        rewards: laid out like `actions`; 0.0 where they are not known: no learner reads them, and a report pays the
+            expert of such a dataset by the table.
         terminated: did the environment end it? One boolean, (N,) booleans, or laid out like `actions`.
         truncated: did a time limit? An episode that is neither counts as truncated: its log stops.
         next_observations: laid out like `actions`; what each step led to.

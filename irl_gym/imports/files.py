@@ -18,12 +18,13 @@ SEPARATORS = {".csv": ",", ".tsv": "\t"}
 PARQUET = (".parquet", ".pq")
 
 
-def read_frame(source: Any, columns: dict[str, str]) -> tuple[Any, Name]:
+def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = frozenset()) -> tuple[Any, Name]:
     """Some columns of a data frame or a file, and what names its rows.
 
     Args:
         source: a pandas DataFrame, or the path of a CSV, TSV or Parquet file.
         columns: what a column is for -> its name.
+        optional: what a column may be missing for.
 
     Raises:
         InvalidParameter: something else than a frame or such a file.
@@ -38,7 +39,7 @@ def read_frame(source: Any, columns: dict[str, str]) -> tuple[Any, Name]:
             'data frames need pandas, which is missing: expected it installed. pip install "irl_gym[data]".'
         ) from error
     if isinstance(source, pd.DataFrame):
-        _check_columns("the frame", list(source.columns), columns)
+        _check_columns("the frame", list(source.columns), columns, optional)
         return source, lambda row: f"row {row + 1} (index {source.index[row]})"
     if not isinstance(source, str | Path):
         raise InvalidParameter(f"the source is {type(source).__name__}: expected a pandas DataFrame or the path of a file.")
@@ -50,7 +51,7 @@ def read_frame(source: Any, columns: dict[str, str]) -> tuple[Any, Name]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)  # rows that are longer than the header
-            return _read(pd, path, columns)
+            return _read(pd, path, columns, optional)
     except ImportError as error:
         raise NotInstalled('Parquet files need pyarrow, which is missing: expected it. pip install "irl_gym[data]".') from error
     except pd.errors.EmptyDataError as error:
@@ -64,15 +65,17 @@ def read_frame(source: Any, columns: dict[str, str]) -> tuple[Any, Name]:
         raise InvalidDemonstrations(f"{path.name} cannot be read ({reason}): expected {path.suffix} with a header.") from error
 
 
-def _read(pd: Any, path: Path, columns: dict[str, str]) -> tuple[Any, Name]:
+def _read(pd: Any, path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
     if path.suffix in PARQUET:
         import pyarrow.parquet
 
-        _check_columns(path.name, pyarrow.parquet.read_schema(path).names, columns)
-        return pd.read_parquet(path, columns=list(dict.fromkeys(columns.values()))), lambda row: f"row {row + 1} of {path.name}"
+        there = pyarrow.parquet.read_schema(path).names
+        _check_columns(path.name, there, columns, optional)
+        wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
+        return pd.read_parquet(path, columns=wanted), lambda row: f"row {row + 1} of {path.name}"
     separator = SEPARATORS[path.suffix]
     header = pd.read_csv(path, sep=separator, nrows=0, index_col=False)
-    _check_columns(path.name, list(header.columns), columns)
+    _check_columns(path.name, list(header.columns), columns, optional)
     old = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
     exact = {"float_precision": "round_trip"} if old else {}  # since 3.1 the default: the floats that were written
     frame = pd.read_csv(path, sep=separator, index_col=False, low_memory=False, **exact)
@@ -90,9 +93,9 @@ def _line(path: Path, separator: str, row: int) -> int:
         return next(itertools.islice(filled, row + 1, None))
 
 
-def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str]) -> None:
+def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str], optional: frozenset[str]) -> None:
     for role, column in columns.items():
-        if list(there).count(column) == 1:
+        if list(there).count(column) == 1 or (role in optional and column not in there):
             continue
         if column in there:
             raise InvalidDemonstrations(f"{where} has {list(there).count(column)} columns {column!r}: expected one.")

@@ -37,8 +37,8 @@ def from_frame(
     observation: Any = "observation",
     action: str = "action",
     reward: str | None = "reward",
-    terminated: str | None = None,
-    truncated: str | None = None,
+    terminated: str | None = "terminated",
+    truncated: str | None = "truncated",
     next_observation: Any = None,
     last: Last = "drop",
     space: spaces.Space | None = None,
@@ -60,9 +60,10 @@ def from_frame(
         step: its rows are sorted by it; it goes up by 1 from any number. None: they are in order.
         observation: what was seen before the action.
         action: whole numbers.
-        reward: 0.0 where there is none: no learner reads them, but a report on such a dataset cannot say what the expert
-            earned.
-        terminated: true in the last row of an episode that the environment ended. An episode without counts as truncated.
+        reward: 0.0 where there is none, or no column "reward": no learner reads them; a report pays such an expert by the
+            table.
+        terminated: true in the last row of an episode that the environment ended. An episode without counts as truncated. Like
+            reward and truncated it may be missing where it is not named.
         truncated: true in the last row of an episode that a time limit ended.
         next_observation: like `observation`: what was seen after the action.
         last: what to do without `next_observation`: "drop" the last action of each episode, "repeat" its last observation, or
@@ -97,10 +98,11 @@ def from_frame(
         for i, one in enumerate(_names(next_observation) if next_observation else [])
     }
     path = Path(source) if isinstance(source, str | os.PathLike) else source
-    frame, name = read_frame(path, {**named, **seen, **after})
+    optional = frozenset(one for one in ("reward", "terminated", "truncated") if named.get(one) == one)
+    frame, name = read_frame(path, {**named, **seen, **after}, optional)
     if not len(frame):
         raise InvalidDemonstrations("there are no rows: expected at least one step.")
-    columns = {key: frame[value].to_numpy() for key, value in named.items()}
+    columns = {key: frame[value].to_numpy() for key, value in named.items() if key not in optional or value in frame.columns}
     order, offsets = _order(columns, len(frame), name)
 
     def sorted_name(row: int) -> str:

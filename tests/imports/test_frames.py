@@ -135,7 +135,7 @@ REFUSED = {
     "no rows": (LOG.splitlines()[0], "there are no rows"),
     "empty file": ("", "log.csv is empty: there are no rows"),
     "missing column": (LOG.replace("action", "acton"), r"^log.csv has no column 'action': .* Did you mean action='acton'\?"),
-    "no such column": (LOG.replace("reward", "zzz"), r"no column 'reward': expected it for reward, .* Name the right one"),
+    "no such column": (LOG.replace("episode", "zzz"), r"no column 'episode': expected it for episode, .* Name the right one"),
     "blank lines count": (LOG.replace("0,1,4", "\n\n0,1,4").replace("4,1", "4,9"), r"^row 2 \(line 5 .*\) has action 9"),
 }
 
@@ -243,3 +243,24 @@ def test_a_missing_package_says_what_to_install(name, package, log, monkeypatch)
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(NotInstalled, match=r'pip install "irl_gym\[data\]"'):
         from_frame(path, **LAKE)
+
+
+def test_a_log_without_rewards_is_read(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("episode,step,observation,action\n0,0,0,1\n0,1,4,1\n0,2,8,2\n")
+    (episode,) = from_frame(path, space=spaces.Discrete(16), n_actions=4)
+    assert (episode.rewards.tolist(), episode.terminated) == ([0.0, 0.0], False)
+
+
+def test_a_column_named_terminated_is_read_without_being_asked_for(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("episode,step,observation,action,terminated\n0,0,0,1,true\n0,1,4,1,false\n")
+    with pytest.raises(InvalidDemonstrations, match=r"row 1 .*terminated"):
+        from_frame(path, space=spaces.Discrete(16), n_actions=4)
+
+
+def test_a_column_of_rewards_that_is_named_has_to_be_there(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("episode,step,observation,action\n0,0,0,1\n0,1,4,1\n")
+    with pytest.raises(InvalidDemonstrations, match="no column 'paid': expected it for reward"):
+        from_frame(path, reward="paid", space=spaces.Discrete(16), n_actions=4)

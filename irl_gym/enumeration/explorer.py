@@ -19,7 +19,7 @@ from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proo
 from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.replays import Replays
-from irl_gym.enumeration.trials import Outcomes, Trials, shared_generators
+from irl_gym.enumeration.trials import Outcomes, Trials, shared_mark
 from irl_gym.errors import HiddenState, IrlGymError, NotTabular, UnknownObservation
 from irl_gym.integer_spaces import as_batch, checked_members, key_of, to_numbers
 
@@ -67,6 +67,7 @@ class Explorer:
         self.known_from = 0 if explored is None or not explored.counted["rows"] else explored.n_expanded
         """The first state of which that is known."""
         self.replays = Replays(self.explored, self.trials, self.space, self.key)
+        self._continued = explored is not None
         self._on_states, self._began = on_states, time.monotonic()
         if explored is None:
             self.trials.pulse = self._pulse
@@ -83,13 +84,13 @@ class Explorer:
             HiddenState: one observation behaves in two ways.
             NotTabular: the environment raised an error.
         """
-        explored, shared = self.explored, shared_generators()
+        explored, shared = self.explored, shared_mark()
         while explored.n_expanded < len(explored.keys):
             number = explored.n_expanded
             state = self._waiting.pop(number)
             self._held -= _size(state)
             explored.expand(number, [line for action in range(self.n_actions) for line in self._row(number, state, action)])
-            before, shared = shared, shared_generators()
+            before, shared = shared, shared_mark()
             if shared != before:
                 self._suspect(state)
             self._doubts.extend(self._newcomers.pop(number, ()))
@@ -97,7 +98,8 @@ class Explorer:
                 self._compare(*self._doubts.popleft())
             self._check_limits(time.monotonic() - self._began)
             yield
-        if not self.trials.counting and any(times >= self.limits.revisits for times in self._revisits.values()):
+        more = self._continued or any(times >= self.limits.revisits for times in self._revisits.values())
+        if more and self.limits.revisits and not self.trials.counting:
             walk_on(self, time.monotonic() - self._began)
 
     def _suspect(self, *states: Any) -> None:

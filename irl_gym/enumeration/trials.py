@@ -7,6 +7,7 @@ own, and counted. Both are the same again whenever they are made again, by their
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from ctypes import string_at
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -30,6 +31,8 @@ PULSE = 256
 MOST_REFUSALS = 5
 """Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
 ROUNDING = 1e-12
+WORDS = 4 * 625
+"""Bytes of a Mersenne Twister: its words, and the place among them."""
 
 Result = tuple[Any, float, bool]
 """Observation, reward, terminated."""
@@ -211,6 +214,19 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(_same, a, b))
     return np.array_equal(np.asarray(a), np.asarray(b))
+
+
+def shared_mark() -> tuple[Any, ...]:
+    """What a draw from the generators that NumPy and Python share changes, read fast: once for each state of a search.
+
+    The second of two normal numbers of `np.random.randn` comes from a store and changes nothing here.
+    """
+    _, plain, stored = random.getstate()
+    module: Any = np.random  # whose stubs lack it
+    shared = module.get_bit_generator()
+    if type(shared) is np.random.MT19937:
+        return plain[0], plain[-1], stored, string_at(shared.ctypes.state_address, WORDS)
+    return plain[0], plain[-1], stored, repr(shared.state)
 
 
 def shared_generators() -> tuple[Any, ...]:

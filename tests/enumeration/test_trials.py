@@ -1,5 +1,7 @@
 """Steps whose draws cannot be enumerated are counted: how well, how often, and always the same."""
 
+import random
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from enumeration_envs import Corridor, Slippery, same_table
 from gymnasium import spaces
 
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.enumeration.trials import Trials
+from irl_gym.enumeration.trials import Trials, shared_mark
 from irl_gym.errors import NotTabular
 
 pytestmark = pytest.mark.usefixtures("unchecked")
@@ -240,3 +242,16 @@ def test_a_truncation_of_the_environments_own_is_told():
     method = table_of(Truncates()).evidence.method  # from cells 0 and 1 to the left
     assert "The environment truncated 2 step(s) itself; truncation is not part of a table." in method
     assert "truncat" not in table_of(Corridor()).evidence.method
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [random.random, lambda: random.gauss(0, 1), np.random.rand, lambda: np.random.randint(3), lambda: np.random.rand(624)],  # noqa: NPY002
+    ids=["random", "gauss", "rand", "randint", "as many as there are words"],
+)
+def test_a_draw_from_the_shared_generators_is_seen_in_their_mark(draw):
+    for _ in range(700):
+        before = shared_mark()
+        assert shared_mark() == before
+        draw()
+        assert shared_mark() != before

@@ -74,7 +74,7 @@ def compare_with_steps(
         TableMismatch: a step the table says is impossible, or frequencies that it makes all but impossible.
     """
     walker = _copy_of(env)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, 1])  # not the stream that reset(seed=seed) gives the environment
     A = mdp.n_actions
     first_action = int(getattr(walker.action_space, "start", 0))
     seen, paid, starts = np.empty((steps, 2), dtype=np.int64), np.empty(steps), []

@@ -2,6 +2,7 @@ import threading
 
 import gymnasium as gym
 import pytest
+from gymnasium import spaces
 from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
 from tiny_env import TableEnv, both_ways, coin, lottery
 
@@ -115,3 +116,21 @@ def test_self_check_walks_long_enough_to_meet_a_late_end():
     with pytest.raises(TableMismatch, match=r"said terminated=True|to 0, terminated=True") as caught:
         check(Late([[[(1.0, 0, 0.0, False)]]], [1]))
     assert "outside the table" in str(caught.value) and "irl_gym.reveal.Reveal" in str(caught.value)
+
+
+class Lockstep(gym.Env):
+    """Goes anywhere by a draw of the kind that random actions are, and draws nothing at reset."""
+
+    observation_space = action_space = spaces.Discrete(4)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return 0, {}
+
+    def step(self, action):
+        return int(self.np_random.integers(4)), 0.0, False, False, {}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_random_actions_are_no_echo_of_the_environments_own_draws(seed):
+    assert tabulate(Lockstep(), gamma=0.9, check_steps=4000, seed=seed).evidence.check.p_value > 1e-4

@@ -159,9 +159,10 @@ def test_a_dataset_settles_the_expert_where_it_was_seen_only(runs):
     assert np.array_equal(~np.isnan(kept).any(axis=1), seen)
 
 
-def test_the_experts_value_is_that_of_its_episodes_when_only_these_are_known(runs):
-    episodes = read_minari(LAKE_DATA, root=runs("table, features").out / "dataset")
-    mean = np.mean([0.99 ** np.arange(len(one)) @ one.rewards for one in episodes])
+def test_the_experts_value_is_that_of_its_episodes_paid_by_the_table_when_only_these_are_known(runs, toy_text):
+    episodes = list(read_minari(LAKE_DATA, root=runs("table, features").out / "dataset"))
+    R = toy_text("FrozenLake 4x4 slippery").reward.values
+    mean = np.mean([0.99 ** np.arange(len(one)) @ R[one.observations[:-1], one.actions] for one in episodes])
     assert runs("dataset, features").metrics["policies"]["expert"]["value"] == pytest.approx(mean)
 
 

@@ -5,23 +5,26 @@ them that is worst under the true reward, which is what an unlucky learner finds
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym._typing import ActionSets, Matrix
-from irl_gym.dynamic_programming import evaluate_policy, policy_iteration, tied
+from irl_gym._typing import ActionSets, Matrix, Vector
+from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration, tied
+from irl_gym.errors import InvalidParameter
+from irl_gym.intervals import mean_interval  # noqa: F401
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
 
+TINY = float(np.finfo(np.float64).tiny)
 TIE_TOLERANCE = 1e-6
 """Actions with Q within this of the best are greedy, in units of the reward's largest |R|."""
 
 
 @dataclass(frozen=True, eq=False)
-class WorstTie:
-    """The worst policy among those greedy under a learned reward."""
+class Tie:
+    """A policy among those greedy under a learned reward: the worst or the best of them under the true one."""
 
     policy: np.ndarray
     """(S,) its actions."""
@@ -29,6 +32,18 @@ class WorstTie:
     """Its true value from d0."""
     tied: ActionSets
     """(S, A) the greedy actions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regret:
+    """What a policy loses against an optimal one, in discounted value under the true reward."""
+
+    value: float
+    """From d0."""
+    per_state: Vector
+    """(S,) from each state on; 0 in terminal ones."""
+    optimal: float
+    """The optimal value from d0."""
 
 
 def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any, horizon: int | None = None) -> float:
@@ -65,11 +80,60 @@ def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tole
 
 def worst_tie(
     mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
-) -> WorstTie:
+) -> Tie:
     """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions."""
     ties = optimal_actions(mdp, learned, tolerance=tolerance)
     worst = policy_iteration(mdp, -as_reward(true).expected(mdp), allowed=ties)
-    return WorstTie(worst.policy, -float(mdp.d0 @ worst.V), ties)
+    return Tie(worst.policy, -float(mdp.d0 @ worst.V), ties)
+
+
+def best_tie(
+    mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
+) -> Tie:
+    """The best policy under `true` among those greedy under `learned`: what a learner with luck finds."""
+    ties = optimal_actions(mdp, learned, tolerance=tolerance)
+    best = policy_iteration(mdp, as_reward(true).expected(mdp), allowed=ties)
+    return Tie(best.policy, float(mdp.d0 @ best.V), ties)
+
+
+def regret(mdp: TabularMDP, true: TabularReward | np.ndarray, policy: Any) -> Regret:
+    """V* - V_pi under the true reward, from d0 and from each state.
+
+    Args:
+        mdp: P, gamma and d0.
+        true: (S,) paid on arrival, or (S, A).
+        policy: (S,) actions, (S, A) probabilities or set.
+    """
+    true = as_reward(true)
+    best = policy_iteration(mdp, true).V
+    lost = np.maximum(best - evaluate_policy(mdp, true, policy), 0.0)  # below 0 by rounding only
+    return Regret(float(mdp.d0 @ lost), lost, float(mdp.d0 @ best))
+
+
+def expected_value_difference(
+    mdp: TabularMDP,
+    true: TabularReward | np.ndarray,
+    learned: TabularReward | np.ndarray,
+    expert: Any = None,
+    *,
+    tolerance: float = TIE_TOLERANCE,
+) -> float:
+    """Expert's value less that of a policy planned for the learned reward, both under the true one and from d0.
+
+    The planned policy takes each of its tied actions with the same probability, so the figure does not depend on the order
+    of actions; `worst_tie` and `best_tie` bound it. (Levine, Popovic & Koltun 2011, section 6.) Below 0 when the planned
+    policy is better than an expert that errs.
+
+    Args:
+        mdp: P, gamma and d0.
+        true: (S,) paid on arrival, or (S, A).
+        learned: the same, of either kind.
+        expert: (S,) actions, (S, A) probabilities or set; None for an optimal one.
+        tolerance: what counts as tied; see `optimal_actions`.
+    """
+    true = as_reward(true)
+    value = float(mdp.d0 @ policy_iteration(mdp, true).V) if expert is None else policy_value(mdp, true, expert)
+    return value - policy_value(mdp, true, optimal_actions(mdp, learned, tolerance=tolerance))
 
 
 def normalised_score(value: float, random: float, expert: float) -> float:
@@ -87,9 +151,37 @@ def agreement(mdp: TabularMDP, policy: Any, good: ActionSets) -> float:
     return float((probabilities * good).sum(axis=1)[acting].mean())
 
 
-def mean_interval(values: np.ndarray, *, rng: np.random.Generator, resamples: int = 2000) -> tuple[float, float, float]:
-    """The mean of sampled returns with a bootstrapped 95 % interval: mean, low, high."""
-    values = np.asarray(values, dtype=np.float64)
-    means = values[rng.integers(values.size, size=(resamples, values.size))].mean(axis=1)
-    low, high = np.quantile(means, [0.025, 0.975])
-    return float(values.mean()), float(low), float(high)
+def tie_aware_agreement(
+    mdp: TabularMDP, learned: TabularReward | np.ndarray, expert: Any, *, tolerance: float = TIE_TOLERANCE
+) -> float:
+    """Share of the reachable, non-terminal states whose expert's action is within a tolerance of the learned reward's best.
+
+    Comparing the actions of two greedy policies calls every tie broken differently a disagreement; this does not.
+    """
+    return agreement(mdp, expert, optimal_actions(mdp, learned, tolerance=tolerance))
+
+
+def occupancy_distance(
+    mdp: TabularMDP, first: Any, second: Any, *, on: Literal["state", "state-action"] = "state-action"
+) -> float:
+    """Total variation between the discounted occupancies of two policies: 0 for the same behaviour, 1 for none in common.
+
+    Each occupancy mu(s, a) = sum_t gamma^t P(s_t = s, a_t = a) is divided by its sum. Terminal states take no step; where every
+    episode starts in one, no step is ever taken and all policies are the same.
+
+    Args:
+        mdp: P, gamma and d0.
+        first: (S,) actions, (S, A) probabilities or set.
+        second: the same.
+        on: compare where the policies are, or what they do there as well.
+
+    Raises:
+        InvalidParameter: `on` is neither.
+    """
+    if on not in ("state", "state-action"):
+        raise InvalidParameter(f"on is {on!r}: expected 'state' or 'state-action'.")
+    visits = [occupancy(mdp, policy) for policy in (first, second)]
+    if on == "state":
+        visits = [mu.sum(axis=1) for mu in visits]
+    one, other = (mu / max(mu.sum(), TINY) for mu in visits)
+    return min(1.0, float(np.abs(one - other).sum() / 2))

@@ -5,13 +5,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration
+from irl_gym.errors import InvalidParameter
+from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import (
     agreement,
-    mean_interval,
+    best_tie,
+    expected_value_difference,
     normalised_score,
+    occupancy_distance,
     optimal_actions,
     policy_value,
     random_value,
+    regret,
+    tie_aware_agreement,
     worst_tie,
 )
 from irl_gym.rewards import TabularReward
@@ -117,12 +124,104 @@ def test_agreement_does_not_count_terminal_states():
     assert agreement(model.mdp, model.expert, good) == 1
 
 
-def test_mean_interval_holds_the_true_mean_about_as_often_as_it_says():
-    rng = np.random.default_rng(0)
-    intervals = [mean_interval(rng.normal(3, 1, size=60), rng=rng, resamples=500) for _ in range(200)]
-    covered = np.mean([low <= 3 <= high for _, low, high in intervals])
-    assert 0.88 <= covered <= 0.99
+@pytest.mark.parametrize("seed", range(5))
+def test_best_tie_is_the_best_of_all_greedy_policies(seed):
+    model = models.random_model(seed, S=5, A=3, kind="terminal")
+    learned = TabularReward(np.round(np.random.default_rng(seed).uniform(-1, 1, 5)))
+    found = best_tie(model.mdp, learned, TabularReward(model.R))
+    greedy_policies = itertools.product(*(np.flatnonzero(row) for row in found.tied))
+    assert found.value == pytest.approx(max(dense_value(model, np.array(policy)) for policy in greedy_policies))
 
 
-def test_mean_interval_is_a_point_when_all_values_are_equal():
-    assert mean_interval(np.full(10, 2.5), rng=np.random.default_rng(0)) == (2.5, 2.5, 2.5)
+@given(model=models.models())
+def test_regret_is_the_optimal_value_less_the_policy_s_in_each_state(model):
+    policy = np.zeros(model.mdp.n_states, dtype=np.int64)
+    found = regret(model.mdp, TabularReward(model.R), policy)
+    everything = [
+        evaluate_policy(model.mdp, TabularReward(model.R), one)
+        for one in (policy_iteration(model.mdp, model.step_reward).policy, policy)
+    ]
+    assert found.per_state == pytest.approx(everything[0] - everything[1], abs=1e-9)
+
+
+@given(model=models.models())
+def test_regret_from_the_start_is_that_of_the_states_weighed_by_d0(model):
+    found = regret(model.mdp, TabularReward(model.R), np.zeros(model.mdp.n_states, dtype=np.int64))
+    assert found.value == pytest.approx(model.mdp.d0 @ found.per_state)
+
+
+@given(model=models.models())
+def test_regret_of_the_expert_is_zero(model):
+    assert regret(model.mdp, TabularReward(model.R), model.expert).per_state == pytest.approx(0.0, abs=1e-7)
+
+
+@given(model=models.models())
+def test_expected_value_difference_lies_between_the_best_and_the_worst_tie_s(model):
+    true, learned = TabularReward(model.R), TabularReward(np.round(model.R))
+    value = policy_value(model.mdp, true, model.expert)
+    found = expected_value_difference(model.mdp, true, learned)
+    best, worst = (tie(model.mdp, learned, true).value for tie in (best_tie, worst_tie))
+    assert value - best - 1e-7 <= found <= value - worst + 1e-7
+
+
+@given(model=models.models())
+def test_expected_value_difference_of_the_true_reward_shaped_is_zero(model):
+    potential = np.where(model.mdp.terminal, 0.0, np.arange(model.mdp.n_states) / 3)
+    steps = model.mdp.gamma * (model.mdp.P @ potential).reshape(model.mdp.n_states, -1) - potential[:, None]
+    shaped = TabularReward(3 * (model.step_reward + steps))
+    assert expected_value_difference(model.mdp, TabularReward(model.R), shaped) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_expected_value_difference_is_negative_when_the_expert_errs_and_the_reward_is_right():
+    model = models.random_model(3)
+    true = TabularReward(model.R)
+    bad = np.full((model.mdp.n_states, model.mdp.n_actions), 1 / model.mdp.n_actions)
+    assert expected_value_difference(model.mdp, true, true, bad) < -1e-3
+
+
+def test_tie_aware_agreement_counts_ties_broken_otherwise():
+    model = models.random_model(0)
+    flat = TabularReward(np.zeros(model.mdp.n_states))
+    assert tie_aware_agreement(model.mdp, flat, model.expert) == 1.0
+
+
+def test_tie_aware_agreement_is_zero_for_the_opposite_reward():
+    model = models.random_model(0, kind="deterministic")
+    opposite = tie_aware_agreement(model.mdp, TabularReward(-model.R), model.expert)
+    assert opposite < tie_aware_agreement(model.mdp, TabularReward(model.R), model.expert) == 1.0
+
+
+def two_ways():
+    """A start with two ways to ends of their own."""
+    P = np.zeros((3, 2, 3))
+    P[0, 0, 1] = P[0, 1, 2] = 1.0
+    return TabularMDP.from_dense(P, 0.9, [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("on", "expected"), [("state", 0.0), ("state-action", 1.0)])
+def test_occupancy_distance_of_two_ways_depends_on_what_is_compared(on, expected):
+    assert occupancy_distance(two_ways(), np.array([0, 0, 0]), np.array([1, 0, 0]), on=on) == expected
+
+
+@given(model=models.models())
+def test_occupancy_distance_is_a_pseudometric(model):
+    S, A = model.mdp.n_states, model.mdp.n_actions
+    policies = [np.full(S, a % A) for a in range(2)] + [np.full((S, A), 1 / A)]
+    d = np.array([[occupancy_distance(model.mdp, one, other) for other in policies] for one in policies])
+    assert np.diag(d) == pytest.approx(0.0) and d == pytest.approx(d.T)
+    assert d[0, 2] <= d[0, 1] + d[1, 2] + 1e-12 and d.max() <= 1.0
+
+
+@given(model=models.models())
+def test_occupancy_distance_bounds_the_difference_of_values(model):
+    rewards = model.step_reward / max(1e-12, np.abs(model.step_reward).max())
+    policies = (model.expert, np.full((model.mdp.n_states, model.mdp.n_actions), 1 / model.mdp.n_actions))
+    mus = [occupancy(model.mdp, policy) for policy in policies]
+    means = [(mu * rewards).sum() / mu.sum() for mu in mus]
+    assert abs(means[0] - means[1]) <= 2 * occupancy_distance(model.mdp, *policies) + 1e-9
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_occupancy_distance_refuses_to_compare_something_else():
+    with pytest.raises(InvalidParameter, match="on is 'action': expected 'state'"):
+        occupancy_distance(two_ways(), np.zeros(3, dtype=int), np.zeros(3, dtype=int), on="action")

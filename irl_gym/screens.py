@@ -26,6 +26,8 @@ WAIT = 100
 """Milliseconds after which waiting for a key looks up, so that Ctrl-C in the terminal is heard."""
 REPEAT = (300, 80)
 """Milliseconds before a key that is held repeats, and between repetitions."""
+UNSEEN = {"offscreen", "dummy"}
+"""SDL's drivers of windows that nobody sees, which it falls back to where there is no display."""
 
 
 def terminal_keys() -> Keys:
@@ -85,6 +87,7 @@ def _blit(picture: np.ndarray, said: str) -> None:
         screen: Any = pygame.display.get_surface()
         if screen is None or screen.get_size() != size:
             pygame.display.init()
+            _check_driver()
             screen = pygame.display.set_mode(size)
     except pygame.error as error:
         raise InvalidParameter(
@@ -93,6 +96,13 @@ def _blit(picture: np.ndarray, said: str) -> None:
     screen.blit(pygame.surfarray.make_surface(picture.swapaxes(0, 1)), (0, 0))
     pygame.display.set_caption(said.splitlines()[-1])
     pygame.display.flip()
+
+
+def _check_driver() -> None:
+    """Raise where windows are not seen, unless that was asked for."""
+    driver = pygame.display.get_driver()
+    if driver in UNSEEN and "SDL_VIDEODRIVER" not in os.environ:
+        raise pygame.error(f"SDL finds no display and would draw {driver}")
 
 
 def as_text(turn: Turn, columns: int, lines: int, *, colours: bool) -> str:

@@ -81,6 +81,8 @@ def play_on(play: Play, mode: Mode) -> None:
 def main(asked: Arguments) -> int:
     """Play, write what was finished, and say how to learn from it."""
     code = 0
+    if asked.mode == "terminal":
+        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures for a terminal need no display
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that knows no arrows gets question marks
     try:

@@ -95,6 +95,20 @@ def test_a_window_without_a_display_is_refused(tmp_path):
     assert made.returncode == 2 and made.stderr.startswith("InvalidParameter: FrozenLake-v1 cannot be rendered here")
 
 
+def test_a_window_that_nobody_would_see_is_refused(tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    made = piped("", "--mode", "window", cwd=tmp_path)
+    assert made.returncode == 2 and "SDL finds no display" in made.stderr and "Play in the terminal" in made.stderr
+
+
+def test_pictures_in_a_terminal_need_no_display(tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    made = piped("q", "--env-id", "CartPole-v1", cwd=tmp_path)
+    assert made.returncode == 1 and made.stderr == ""
+
+
 def test_a_taken_id_is_refused_before_playing(tmp_path):
     asked = (*LAKE, "--episodes", "1", "--dataset-id", "me/lake-v0")
     assert piped(WON, *asked, cwd=tmp_path).returncode == 0

@@ -27,7 +27,7 @@ from irl_gym.errors import (
     NotDiscrete,
     UnknownEnvironment,
 )
-from irl_gym.minari_files import Description, check_free, check_id, identity, publish, write_files
+from irl_gym.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.minari_formats import DataFormat
 from irl_gym.states import States
 
@@ -254,8 +254,8 @@ def _check_recorded(dataset: minari.MinariDataset, env: gym.Env) -> None:
     if spec is not None and (spec.id in gym.registry or (env.spec is not None and env.spec.id == spec.id)):
         if identity(spec) != identity(env.spec):
             raise DatasetMismatch(
-                f"dataset {name!r} was recorded in {identity(spec)}: expected {identity(env.spec)}. Make the environment with "
-                "`dataset.recover_environment()`."
+                f"dataset {name!r} was recorded in {told(spec)}: expected {told(env.spec)}. Leave --env-id and --env-kwargs "
+                "out, or make the environment with `dataset.recover_environment()`."
             )
         return
     for what in ("observation", "action"):

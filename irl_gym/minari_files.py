@@ -103,6 +103,16 @@ def identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
     return (spec.id, kwargs, wrappers) if wrappers else (spec.id, kwargs)
 
 
+def told(spec: EnvSpec | None) -> str:
+    """An environment's identity in words: FrozenLake-v1 with map_name='8x8'."""
+    named = identity(spec)
+    if named is None:
+        return "an environment without a spec"
+    words = [f"{name}={value!r}" for name, value in named[1].items()]
+    words += [f"the wrapper {one[0]}" for one in (named[2] if len(named) > 2 else ())]
+    return f"{named[0]} with {', '.join(words)}" if words else str(named[0])
+
+
 def _plain(value: Any) -> Any:
     """As json gives it back: lists for tuples."""
     return json.loads(json.dumps(value, default=repr))

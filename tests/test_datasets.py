@@ -126,7 +126,7 @@ def test_a_dataset_of_the_same_environment_is_read(root, env):
 
 
 def test_a_dataset_of_an_environment_made_otherwise_is_refused(root):
-    with pytest.raises(DatasetMismatch, match=r"with is_slippery=False.*with is_slippery=True"):
+    with pytest.raises(DatasetMismatch, match=r"is_slippery=False.*is_slippery=True"):
         next(read_minari(ID, root=root, env=gym.make("FrozenLake-v1", is_slippery=True)))
 
 

@@ -14,7 +14,6 @@ from typing import Literal
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from irl_gym import IrlGymError
@@ -24,6 +23,7 @@ from irl_gym.datasets import described
 from irl_gym.demonstrators import Recording
 from irl_gym.experiment import parse_keywords
 from irl_gym.export import Amount, export_dataset
+from irl_gym.terminal import print_error, stage_bars
 
 
 @dataclass(frozen=True)
@@ -67,17 +67,6 @@ class Arguments:
 def main(arguments: Arguments) -> int:
     """Export, and say what there is."""
     console = Console(soft_wrap=True)
-    bar = Progress(
-        TextColumn("{task.description:9}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
-        console=console, disable=not console.is_terminal,
-    )  # fmt: skip
-    tasks: dict[str, TaskID] = {}
-
-    def show(stage: str, share: float) -> None:
-        if stage not in tasks:
-            tasks[stage] = bar.add_task(stage, total=1.0)
-        bar.update(tasks[stage], completed=share)
-
     try:
         amount = Amount(
             1_000 if arguments.episodes is None and arguments.steps is None else arguments.episodes, arguments.steps
@@ -90,7 +79,7 @@ def main(arguments: Arguments) -> int:
         env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
         metadata = {**recording.metadata(arguments.env_id), "code_permalink": "scripts/export_dataset.py of irl_gym"}
         about = described(arguments.dataset_id, env, None, None, arguments.format, metadata)
-        with bar:
+        with stage_bars(console) as show:
             dataset = export_dataset(
                 lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
                 about, amount, recording.plan(env), root=arguments.root, on_progress=show,
@@ -99,8 +88,7 @@ def main(arguments: Arguments) -> int:
         Console(stderr=True).print("Stopped. The same command continues after the last episodes written.")
         return 130
     except IrlGymError as error:
-        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
-        Console(stderr=True, soft_wrap=True).print(text)
+        print_error(error)
         return 2
     size = dataset.storage.metadata["dataset_size"]
     console.print(

@@ -18,14 +18,13 @@ from dataclasses import dataclass
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
 
 import tyro
-from rich.console import Console
-from rich.text import Text
 
 from irl_gym import IrlGymError
 from irl_gym.experiment import parse_keywords
 from irl_gym.keyboard import controls_of
 from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
 from irl_gym.screens import as_text, draw, terminal_keys, window_keys
+from irl_gym.terminal import print_error
 
 ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 """Ctrl-C, a kill, a terminal that is closed: nothing that was finished is lost."""
@@ -104,7 +103,7 @@ def main(asked: Arguments) -> int:
             if play.episodes:
                 write_played(play, dataset_id, plain, asked.root)
     except IrlGymError as error:
-        Console(stderr=True, soft_wrap=True).print(Text.assemble((type(error).__name__, "bold red"), f": {error}"))
+        print_error(error)
         return 2
     print(*filter(None, (parting,)), sep="\n", end="\n" if parting else "")
     if not play.episodes:

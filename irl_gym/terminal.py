@@ -1,0 +1,35 @@
+"""What all scripts say in a terminal in the same way: how far a stage is, and what went wrong."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from irl_gym.errors import IrlGymError
+
+
+@contextlib.contextmanager
+def stage_bars(console: Console) -> Iterator[Callable[[str, float], None]]:
+    """A bar for each stage, on a terminal only; gives what is to be told a stage and the share of it that is done."""
+    bars = Progress(
+        TextColumn("{task.description:14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
+        console=console, disable=not console.is_terminal,
+    )  # fmt: skip
+    tasks: dict[str, Any] = {}
+
+    def show(stage: str, share: float) -> None:
+        if stage not in tasks:
+            tasks[stage] = bars.add_task(stage, total=1.0)
+        bars.update(tasks[stage], completed=share)
+
+    with bars:
+        yield show
+
+
+def print_error(error: IrlGymError) -> None:
+    """A mistake of the user's, in one line on standard error: the error's name in red, then what it says."""
+    text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
+    Console(stderr=True, soft_wrap=True).print(text)

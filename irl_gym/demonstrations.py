@@ -14,7 +14,7 @@ import numpy as np
 from irl_gym._typing import Matrix, StateMask
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidDemonstrations, UnknownObservation
-from irl_gym.features import batch_size
+from irl_gym.features import batch_size, by_part
 from irl_gym.mdp import TransitionTable
 from irl_gym.policies import Policy, as_distribution
 from irl_gym.sampling import Successors
@@ -82,12 +82,7 @@ class Episode:
 
 def stacked(observations: Sequence[Any]) -> Any:
     """Observations as a batch, stacked as vector environments stack them."""
-    first = observations[0]
-    if isinstance(first, dict):
-        return {key: stacked([one[key] for one in observations]) for key in first}
-    if isinstance(first, tuple):
-        return tuple(stacked([one[i] for one in observations]) for i in range(len(first)))
-    return np.asarray(observations)
+    return by_part(lambda *parts: np.asarray(parts), *observations)
 
 
 def collect(

@@ -9,7 +9,7 @@ what it does with the coordinates and which values come out.
 Axes: N observations, d coordinates, K features.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -234,18 +234,24 @@ def batch_size(observations: Any) -> int:
     return len(observations)
 
 
+def by_part(function: Callable[..., Any], *batches: Any) -> Any:
+    """Call a function on the arrays of batches that are laid out alike, part by part."""
+    first = batches[0]
+    if isinstance(first, Mapping):
+        return {key: by_part(function, *(one[key] for one in batches)) for key in first}
+    if isinstance(first, tuple):
+        return tuple(by_part(function, *parts) for parts in zip(*batches, strict=True))
+    return function(*batches)
+
+
 def take(observations: Any, which: Any) -> Any:
     """Some observations of a stacked batch, by a slice or an array of positions."""
-    if isinstance(observations, dict):
-        return {key: take(value, which) for key, value in observations.items()}
-    return tuple(take(one, which) for one in observations) if isinstance(observations, tuple) else observations[which]
+    return by_part(lambda part: part[which], observations)
 
 
 def batch_of_one(observation: Any) -> Any:
     """One observation, stacked as a batch of one."""
-    if isinstance(observation, dict):
-        return {key: batch_of_one(value) for key, value in observation.items()}
-    return tuple(map(batch_of_one, observation)) if isinstance(observation, tuple) else np.asarray(observation)[None]
+    return by_part(lambda part: np.asarray(part)[None], observation)
 
 
 def integers(observations: Any, n: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidParameter
-from irl_gym.features import take
+from irl_gym.features import by_part, take
 from irl_gym.policies import Policy
 
 TOGETHER = 4096
@@ -152,19 +152,9 @@ def _episode(moments: list[Moment], places: list[int]) -> Episode:
     steps = list(zip(moments, places, strict=True))
     last, place = steps[-1]
     return Episode(
-        _stacked([take(moment.observations, np.array([i])) for moment, i in steps]),
+        by_part(lambda *parts: np.concatenate(parts), *(take(moment.observations, np.array([i])) for moment, i in steps)),
         np.array([moment.actions[i] for moment, i in steps[1:]]),
         np.array([moment.rewards[i] for moment, i in steps[1:]]),
         bool(last.terminated[place]),
         bool(last.truncated[place]),
     )
-
-
-def _stacked(parts: list[Any]) -> Any:
-    """Batches of one, as one batch."""
-    first = parts[0]
-    if isinstance(first, dict):
-        return {key: _stacked([part[key] for part in parts]) for key in first}
-    if isinstance(first, tuple):
-        return tuple(_stacked([part[i] for part in parts]) for i in range(len(first)))
-    return np.concatenate(parts)

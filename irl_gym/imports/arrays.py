@@ -3,6 +3,7 @@
 Axes: N episodes, T steps, n rows of all episodes one after the other.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -11,10 +12,9 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.imports.cutting import counts_of, cut, depth, first_part, from_lists, from_padded
-from irl_gym.imports.expected import expect
-from irl_gym.imports.members import as_array, is_list, numbers
-from irl_gym.imports.rows import Last
+from irl_gym.imports.cutting import FLAGS, counts_of, cut, depth, from_lists, from_padded, offsets_at, offsets_of
+from irl_gym.imports.reading import Last, Reading, reading
+from irl_gym.imports.values import as_array, first_part, is_list, numbers
 
 
 def from_arrays(
@@ -72,27 +72,49 @@ def from_arrays(
         InvalidParameter: spaces that are missing, or two ways to cut.
         NotDiscrete: continuous actions.
     """
-    expected = expect(space, n_actions, action_space, env)
+    how = reading(space, n_actions, action_space, env, last)
+    columns = {"observations": observations, "actions": actions, "rewards": rewards}
+    columns |= {"terminated": terminated, "truncated": truncated, "next_observations": next_observations}
     cuts = {"ends": ends, "lengths": lengths, "episode": episode}
-    named = [key for key, value in cuts.items() if value is not None]
-    if len(named) > 1:
-        raise InvalidParameter(f"{named[0]} and {named[1]} are both given: expected one of them. Leave the other out.")
-    columns = {"rewards": rewards, "terminated": terminated, "truncated": truncated, "next_observations": next_observations}
+    return episodes_of(how, columns, {key: value for key, value in cuts.items() if value is not None})
+
+
+def episodes_of(how: Reading, columns: dict[str, Any], cuts: Mapping[str, Any]) -> list[Episode]:
+    """Episodes from columns in one of the layouts of `from_arrays`.
+
+    Args:
+        how: what they are checked against.
+        columns: as `irl_gym.imports.cutting` has them.
+        cuts: ends, lengths or episode, or nothing.
+
+    Raises:
+        InvalidDemonstrations: rows that cannot be right.
+        InvalidParameter: two ways to cut.
+    """
+    parted = ("observations", "next_observations") if isinstance(how.space, spaces.Tuple) else ()  # there a tuple is of parts
+    columns = {key: list(one) if isinstance(one, tuple) and key not in parted else one for key, one in columns.items()}
+    if len(cuts) > 1:
+        raise InvalidParameter(f"{' and '.join(cuts)} are both given: expected one of them. Leave the other out.")
+    actions = columns["actions"]
     if not is_list(actions):
         raise InvalidDemonstrations(f"the actions are {type(actions).__name__}: expected an array, or a list of arrays.")
     if len(actions) == 0:
         raise InvalidDemonstrations("there are no rows: expected at least one step.")
-    if isinstance(actions, np.ndarray) and actions.shape[1:] == (1,) and len(actions) > 1 and not named:
-        actions = _of_column(expected.space, observations, actions)
-    if isinstance(actions, np.ndarray) and actions.ndim == 2 and ends is None and episode is None:
-        counts = np.full(len(actions), actions.shape[1]) if lengths is None else counts_of(lengths)
+    if isinstance(actions, np.ndarray) and actions.shape[1:] == (1,) and len(actions) > 1 and not cuts:
+        columns["actions"] = actions = _of_column(how.space, columns["observations"], actions)
+    if isinstance(actions, np.ndarray) and actions.ndim == 2 and not {"ends", "episode"} & set(cuts):
+        counts = counts_of(cuts["lengths"]) if cuts else np.full(len(actions), actions.shape[1])
         if len(counts) == len(actions):
-            return from_padded(expected, observations, actions, columns, counts, last)
-    if not named and depth(actions) > 1:
-        return from_lists(expected, observations, actions, columns, last)
-    n = len(actions)
-    offsets = _offsets(n, ends, lengths, episode, terminated, truncated)
-    return cut(expected, observations, actions, columns, offsets, last, lambda row: f"row {row} (from 0)")
+            return from_padded(how, columns, counts)
+    if not cuts and depth(actions) > 1:
+        return from_lists(how, columns)
+    if not cuts:
+        cuts = {key: columns[key] for key in FLAGS if columns.get(key) is not None}
+    return cut(how, columns, _offsets(len(actions), cuts), _row_from_0)
+
+
+def _row_from_0(row: int) -> str:
+    return f"row {row} (from 0)"
 
 
 def _of_column(space: spaces.Space, observations: Any, actions: np.ndarray) -> np.ndarray:
@@ -113,35 +135,35 @@ def _of_column(space: spaces.Space, observations: Any, actions: np.ndarray) -> n
     return actions[:, 0] if part == (n, *shape) else actions
 
 
-def _offsets(n: int, ends: Any, lengths: Any, episode: Any, terminated: Any, truncated: Any) -> np.ndarray:
-    """(N + 1,) where the episodes of n rows start, and n."""
-    if lengths is not None:
-        offsets = np.concatenate([[0], np.cumsum(counts_of(lengths))])
+def _offsets(n: int, cuts: Mapping[str, Any]) -> np.ndarray:
+    """(N + 1,) where the episodes of n rows start, and n; `cuts` is one of the three, or the flags."""
+    if "lengths" in cuts:
+        offsets = offsets_of(counts_of(cuts["lengths"]))
         if offsets[-1] != n:
             raise InvalidDemonstrations(f"the lengths add up to {offsets[-1]}: expected {n}, the number of actions.")
         return offsets
-    if episode is not None:
-        ids = as_array(episode, "episode ids")
-        if ids.shape != (n,):
-            raise InvalidDemonstrations(f"the episode ids have shape {ids.shape}: expected ({n},), one an action.")
-        starts = np.flatnonzero(np.append(True, ids[1:] != ids[:-1]))
-        seen = set()
-        for row in starts.tolist():
-            one = ids[row : row + 1].tolist()[0]
-            if one in seen:
-                raise InvalidDemonstrations(
-                    f"row {row} (from 0) goes back to episode {one!r}: expected its rows one after the other. Sort them."
-                )
-            seen.add(one)
-        return np.append(starts, n)
-    given = [one for one in (ends, terminated, truncated) if one is not None]
-    given = given if ends is None else [ends]
-    flags = [numbers(one, "end", lambda row: f"row {row} (from 0)") for one in given]
-    if not flags or any(one.shape != (n,) for one in flags):
-        shapes = " and ".join(str(one.shape) for one in flags) or "not given"
+    if "episode" in cuts:
+        return _offsets_of_ids(n, as_array(cuts["episode"], "episode ids"))
+    ends = [numbers(one, "end", _row_from_0) for one in cuts.values()]
+    if not ends or any(one.shape != (n,) for one in ends):
+        shapes = " and ".join(str(one.shape) for one in ends) or "not given"
         raise InvalidDemonstrations(
             f"the ends of the episodes are {shapes} for {n} actions in one array: expected ends, lengths or episode. Write "
             "[actions] and [observations] if it is one episode."
         )
-    marks = np.flatnonzero(np.any(flags, axis=0)) + 1
-    return np.unique(np.concatenate([[0], marks, [n]])).astype(np.int64)
+    return offsets_at(np.any(ends, axis=0))
+
+
+def _offsets_of_ids(n: int, ids: np.ndarray) -> np.ndarray:
+    if ids.shape != (n,):
+        raise InvalidDemonstrations(f"the episode ids have shape {ids.shape}: expected ({n},), one an action.")
+    offsets = offsets_at(np.append(ids[1:] != ids[:-1], True))
+    seen = set()
+    for row in offsets[:-1].tolist():
+        one = ids[row : row + 1].tolist()[0]
+        if one in seen:
+            raise InvalidDemonstrations(
+                f"row {row} (from 0) goes back to episode {one!r}: expected its rows one after the other. Sort them."
+            )
+        seen.add(one)
+    return offsets

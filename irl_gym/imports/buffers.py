@@ -5,7 +5,6 @@ truncation: its last observations are missing, as in most logs. The copies are r
 each is unfinished and counts as truncated. No attribute is imported from Stable-Baselines3: anything laid out so is read.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -14,10 +13,9 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations
-from irl_gym.features import take
-from irl_gym.imports.expected import expect
-from irl_gym.imports.members import Name
-from irl_gym.imports.rows import Last, Rows, check_last
+from irl_gym.features import by_part
+from irl_gym.imports.reading import Last, reading
+from irl_gym.imports.rows import Rows
 
 
 def from_rollouts(
@@ -51,7 +49,6 @@ def from_rollouts(
         InvalidDemonstrations: no buffer, an empty one, or rows that cannot be right; the first is named by copy and step.
         NotDiscrete: continuous actions.
     """
-    check_last(last)
     replay, rollout = hasattr(buffer, "dones"), hasattr(buffer, "episode_starts")
     if not (replay or rollout) or not hasattr(buffer, "observations"):
         raise InvalidDemonstrations(
@@ -61,34 +58,32 @@ def from_rollouts(
         space = getattr(buffer, "observation_space", None) if space is None else space
         if action_space is None and n_actions is None:
             action_space = getattr(buffer, "action_space", None)
-    expected = expect(space, n_actions, action_space, env)
+    how = reading(space, n_actions, action_space, env, last)
     order = _order(buffer)
     if not len(order):
         raise InvalidDemonstrations("there are no rows: the buffer is empty. Let the algorithm collect some steps first.")
-    copies = np.asarray(buffer.rewards).shape[1]
+    size, copies = int(buffer.buffer_size), np.asarray(buffer.rewards).shape[1]
+    copy, time = np.divmod(np.arange(copies * len(order)), len(order))  # copy after copy, each in the order of time
 
     def column(raw: Any) -> Any:
-        return _by_copy(raw, order, copies, int(buffer.buffer_size))
+        return by_part(lambda part: _by_time(np.asarray(part), size, copies)[order[time], copy], raw)
 
+    flags: dict[str, np.ndarray] = {}
     if replay:
         done = column(buffer.dones) != 0
         timeouts = column(getattr(buffer, "timeouts", np.zeros_like(buffer.dones))) != 0
         flags = {"terminated": done & ~timeouts, "truncated": done & timeouts}
         starts = np.append(True, done[:-1])
     else:
-        starts, flags = column(buffer.episode_starts) != 0, {}
-    starts[:: len(order)] = True
+        starts = column(buffer.episode_starts) != 0
+    starts |= time == 0
     following = getattr(buffer, "next_observations", None)
     rows = _worth_reading(starts, keep_single=following is not None or last == "repeat")
-    offsets = np.append(np.flatnonzero(starts[rows]), len(rows))
-
-    def read(raw: Any) -> Any:
-        return take(column(raw), rows)
-
+    copy, time = copy[rows], time[rows]  # what `column` reads from here on
     return Rows(
-        expected, read(buffer.observations), read(buffer.actions), offsets, _name(rows, len(order)),
-        rewards=read(buffer.rewards), next_observations=None if following is None else read(following), last=last,
-        **{key: flag[rows] for key, flag in flags.items()},
+        how, np.append(np.flatnonzero(starts[rows]), len(rows)), lambda row: f"copy {copy[row]}, step {time[row]} (from 0)",
+        column(buffer.observations), column(buffer.actions), column(buffer.rewards),
+        next_observations=None if following is None else column(following), **{key: flag[rows] for key, flag in flags.items()},
     ).episodes()  # fmt: skip
 
 
@@ -112,19 +107,10 @@ def _order(buffer: Any) -> np.ndarray:
     return order[1:] if getattr(buffer, "optimize_memory_usage", False) else order  # the newest step has overwritten the oldest
 
 
-def _by_copy(raw: Any, order: np.ndarray, copies: int, size: int) -> Any:
-    """Copy after copy, each in the order of time: (E * T, ...)."""
-    if isinstance(raw, Mapping):
-        return {key: _by_copy(part, order, copies, size) for key, part in raw.items()}
-    array = np.asarray(raw)
+def _by_time(array: np.ndarray, size: int, copies: int) -> np.ndarray:
+    """(n_steps, n_envs, ...)."""
     if array.shape[:2] == (size, copies):
-        array = array.swapaxes(0, 1)
-    elif array.shape[:1] == (size * copies,):  # `RolloutBuffer.get` has flattened it, copy after copy
-        array = array.reshape(copies, size, *array.shape[1:])
-    else:
-        raise InvalidDemonstrations(f"the buffer holds an array of shape {array.shape}: expected ({size}, {copies}, ...).")
-    return array[:, order].reshape(copies * len(order), *array.shape[2:])
-
-
-def _name(rows: np.ndarray, steps: int) -> Name:
-    return lambda row: f"copy {rows[row] // steps}, step {rows[row] % steps} (from 0)"
+        return array
+    if array.shape[:1] == (size * copies,):  # `RolloutBuffer.get` has flattened it, copy after copy
+        return array.reshape(copies, size, *array.shape[1:]).swapaxes(0, 1)
+    raise InvalidDemonstrations(f"the buffer holds an array of shape {array.shape}: expected ({size}, {copies}, ...).")

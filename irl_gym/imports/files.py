@@ -5,17 +5,22 @@ Rows are counted from 1, as a person counts them, without the header; lines of a
 
 import csv
 import itertools
+import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter, NotInstalled
-from irl_gym.imports.members import Name
+from irl_gym.imports.values import Name, shown
 
 SEPARATORS = {".csv": ",", ".tsv": "\t"}
 PARQUET = (".parquet", ".pq")
+NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
+"""What may stand between the fields of a line."""
+VALUE = re.compile(r"\s*([-+]?\d*\.?\d*(e[-+]?\d+)?|nan|[-+]?inf|true|false|[(\[].*)\s*", re.IGNORECASE)
+"""A number, a truth, a vector, or nothing: what a step has, and no name of a column."""
 
 
 def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = frozenset()) -> tuple[Any, Name]:
@@ -44,53 +49,92 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
     if not isinstance(source, str | Path):
         raise InvalidParameter(f"the source is {type(source).__name__}: expected a pandas DataFrame or the path of a file.")
     path = Path(source)
-    if path.suffix not in (*SEPARATORS, *PARQUET):
+    kind = path.suffix.lower()
+    if kind not in (*SEPARATORS, *PARQUET):
         raise InvalidParameter(f"{path} ends in {path.suffix!r}: expected .csv, .tsv, .parquet or .pq. Or pass a DataFrame.")
     if not path.is_file():
         raise DatasetMissing(f"{path} is not a file: expected one with the demonstrations.")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)  # rows that are longer than the header
-            return _read(pd, path, columns, optional)
+        if kind in PARQUET:
+            return _read_parquet(pd, path, columns, optional)
+        return _read_text(pd, path, SEPARATORS[kind], columns, optional)
     except ImportError as error:
         raise NotInstalled('Parquet files need pyarrow, which is missing: expected it. pip install "irl_gym[data]".') from error
-    except pd.errors.EmptyDataError as error:
-        raise InvalidDemonstrations(f"{path.name} is empty: there are no rows, expected a header and at least one.") from error
-    except pd.errors.ParserWarning as error:
-        raise InvalidDemonstrations(f"{path.name} has rows with more fields than its header: expected as many.") from error
     except InvalidDemonstrations:
         raise
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, csv.Error, pd.errors.ParserWarning) as error:
         reason = " ".join(str(error).split())
-        raise InvalidDemonstrations(f"{path.name} cannot be read ({reason}): expected {path.suffix} with a header.") from error
+        raise InvalidDemonstrations(f"{path.name} cannot be read ({reason}): expected {kind} with a header.") from error
 
 
-def _read(pd: Any, path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
-    if path.suffix in PARQUET:
-        import pyarrow.parquet
+def _read_parquet(pd: Any, path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
+    import pyarrow.parquet
 
-        there = pyarrow.parquet.read_schema(path).names
-        _check_columns(path.name, there, columns, optional)
-        wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
-        return pd.read_parquet(path, columns=wanted), lambda row: f"row {row + 1} of {path.name}"
-    separator = SEPARATORS[path.suffix]
-    header = pd.read_csv(path, sep=separator, nrows=0, index_col=False)
-    _check_columns(path.name, list(header.columns), columns, optional)
+    there = pyarrow.parquet.read_schema(path).names
+    _check_columns(path.name, there, columns, optional)
+    wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
+    return pd.read_parquet(path, columns=wanted), lambda row: f"row {row + 1} of {path.name}"
+
+
+def _read_text(pd: Any, path: Path, separator: str, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
+    line, header = next(_records(path, separator), (1, []))
+    if not header:
+        raise InvalidDemonstrations(f"{path.name} is empty: there are no rows, expected a header and at least one.")
+    if not set(columns.values()) & set(header):
+        _check_header(f"line {line} of {path.name}", separator, header, columns)
+    there = [one or f"Unnamed: {i}" for i, one in enumerate(header)]  # as pandas calls them
+    _check_columns(path.name, there, columns, optional)
     old = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
     exact = {"float_precision": "round_trip"} if old else {}  # since 3.1 the default: the floats that were written
-    frame = pd.read_csv(path, sep=separator, index_col=False, low_memory=False, **exact)
-    return frame, lambda row: f"row {row + 1} (line {_line(path, separator, row)} of {path.name})"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            frame = pd.read_csv(path, sep=separator, index_col=False, low_memory=False, **exact)
+    except (pd.errors.ParserWarning, pd.errors.ParserError) as error:
+        for line, fields in _records(path, separator):
+            if len(fields) > len(header):
+                raise InvalidDemonstrations(
+                    f"line {line} of {path.name} has {len(fields)} fields, more fields than its header: expected "
+                    f"{len(header)}. Put quotes around values that hold {NAMES[separator]}."
+                ) from error
+        raise
+
+    def name(row: int) -> str:
+        try:
+            line, _ = next(itertools.islice(_records(path, separator), row + 1, None))
+        except csv.Error:  # a field that is too long for the module csv, but not for pandas
+            return f"row {row + 1} of {path.name}"
+        return f"row {row + 1} (line {line} of {path.name})"
+
+    return frame, name
 
 
-def _line(path: Path, separator: str, row: int) -> int:
-    """The line at which a data row of a CSV file starts; blank lines are no rows, and a row may have several lines."""
-    with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
-        reader = csv.reader(file, delimiter=separator)
-        before = itertools.chain([0], (reader.line_num for _ in itertools.repeat(None)))
-        filled = (
-            line + 1 for line, fields in zip(before, reader, strict=False) if any(map(str.strip, fields)) or len(fields) > 1
-        )
-        return next(itertools.islice(filled, row + 1, None))
+def _records(path: Path, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Line and fields of each row, the header first; blank lines are no rows, and a row may have several lines."""
+    with open(path, newline="", encoding="utf-8-sig") as file:
+        reader, line = csv.reader(file, delimiter=separator), 1
+        for fields in reader:
+            if any(map(str.strip, fields)) or len(fields) > 1:
+                yield line, fields
+            line = reader.line_num + 1
+
+
+def _check_header(where: str, separator: str, header: list[str], columns: dict[str, str]) -> None:
+    """Refuse a first line that names none of the columns, where it looks like something else than a header."""
+    text, wanted = separator.join(header), list(dict.fromkeys(columns.values()))
+    other = max((one for one in NAMES if one != separator), key=text.count)
+    if text.lstrip().startswith("#"):
+        named = set(re.split(r"[#\s,;|]+", text)) & set(wanted)
+        mend = "Take the '#' away." if named else "Delete the comments, or pass pandas.read_csv(..., comment='#')."
+        what = f"a header, such as {wanted}, before any comment. {mend}"
+    elif text.count(other) >= len(header) and (other != " " or len(header) == 1):
+        suffix = next((f"Let the file end in {one}, or pass" for one, sign in SEPARATORS.items() if sign == other), "Pass")
+        what = f"{NAMES[separator]} between the columns, not {NAMES[other]}. {suffix} pandas.read_csv(..., sep={other!r})."
+    elif 2 * sum(VALUE.fullmatch(one) is not None for one in header) > len(header):
+        what = f"a header, such as {wanted}, before the values. Write one, or pass pandas.read_csv(..., names=[...])."
+    else:
+        return
+    raise InvalidDemonstrations(f"{where} is {shown(text)}: expected {what}")
 
 
 def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str], optional: frozenset[str]) -> None:
@@ -100,8 +144,17 @@ def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str], op
         if column in there:
             raise InvalidDemonstrations(f"{where} has {list(there).count(column)} columns {column!r}: expected one.")
         taken = {other for key, other in columns.items() if key != role}
-        close = get_close_matches(column, [str(one) for one in there if one not in taken], 1, 0.5)
-        mend = f"Did you mean {role}={close[0]!r}?" if close else f"Name the right one with {role}=..."
+        close = closest(column, [str(one) for one in there if one not in taken])
+        mend = f"Did you mean {role}={close!r}?" if close else f"Name the right one with {role}=..."
+        known = [str(one)[:80] for one in there]
         raise InvalidDemonstrations(
-            f"{where} has no column {column!r}: expected it for {role}, among the columns {[str(one) for one in there]}. {mend}"
+            f"{where} has no column {column!r}: expected it for {role}, among the columns {known}. {mend}"
         )
+
+
+def closest(name: str, there: Iterable[str]) -> str | None:
+    """The name that is most like another, whatever its case, or an abbreviation of it; None if none is like it."""
+    folded = {one.strip().casefold(): one for one in there}
+    name = name.strip().casefold()
+    close = get_close_matches(name, folded, 1, 0.5) or [one for one in folded if len(one) > 1 and name.startswith(one)]
+    return folded[close[0]] if close else None

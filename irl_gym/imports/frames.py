@@ -11,6 +11,7 @@ Nothing is done row by row in Python, so a million rows take seconds. Axes: n ro
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,11 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.imports.expected import expect
+from irl_gym.imports.cutting import FLAGS, offsets_at
 from irl_gym.imports.files import read_frame
-from irl_gym.imports.members import Name, numbers
-from irl_gym.imports.rows import Last, Rows, check_last, truths
+from irl_gym.imports.reading import Last, reading
+from irl_gym.imports.rows import Rows
+from irl_gym.imports.values import NO_WORDS, Name, numbers, shown, truths, whole_numbers
 
 _SIGNS = str.maketrans({sign: " " for sign in "()[]{},;"})
 _WORDS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
@@ -84,50 +86,43 @@ def from_frame(
         NotInstalled: no pandas, or no pyarrow for a Parquet file.
         NotDiscrete: continuous actions.
     """
-    check_last(last)
-    expected = expect(space, n_actions, action_space, env)
+    how = reading(space, n_actions, action_space, env, last)
     roles = {"episode": episode, "step": step, "action": action, "reward": reward}
     roles |= {"terminated": terminated, "truncated": truncated}
     named = {key: value for key, value in roles.items() if value is not None}
     for key, value in {"action": action, **named}.items():
         if not isinstance(value, str):
             raise InvalidParameter(f"{key} is {value!r}: expected the name of a column.")
-    seen = {f"observation {i}" if i else "observation": one for i, one in enumerate(_names(observation))}
-    after = {
-        f"next_observation {i}" if i else "next_observation": one
-        for i, one in enumerate(_names(next_observation) if next_observation else [])
-    }
+    wanted = named | _roles("observation", observation)
+    if next_observation is not None:
+        wanted |= _roles("next_observation", next_observation)
     path = Path(source) if isinstance(source, str | os.PathLike) else source
-    optional = frozenset(one for one in ("reward", "terminated", "truncated") if named.get(one) == one)
-    frame, name = read_frame(path, {**named, **seen, **after}, optional)
+    optional = frozenset(one for one in ("reward", *FLAGS) if named.get(one) == one)
+    frame, name = read_frame(path, wanted, optional)
     if not len(frame):
         raise InvalidDemonstrations("there are no rows: expected at least one step.")
-    columns = {key: frame[value].to_numpy() for key, value in named.items() if key not in optional or value in frame.columns}
-    order, offsets = _order(columns, len(frame), name)
+    order, offsets = _order({key: frame[one].to_numpy() for key, one in named.items() if one in frame}, len(frame), name)
+    columns = {one: frame[one].to_numpy()[order] for one in wanted.values() if one in frame}
+    table = _Table(columns, lambda row: name(int(order[row])))
+    others = {key: columns.get(named.get(key, "")) for key in FLAGS} | {"rewards": columns.get(reward or "")}
+    if next_observation is not None:
+        others["next_observations"] = table.gathered(how.space, next_observation, "next observation")
+    seen = table.gathered(how.space, observation, "observation")
+    return Rows(how, offsets, table.name, seen, columns[action], **others).episodes()
 
-    def sorted_name(row: int) -> str:
-        return name(int(order[row]))
 
-    values = {key: value[order] for key, value in columns.items()}
-
-    def gathered(names: Any, what: str) -> Any:
-        return _gathered(frame, order, expected.space, names, what, sorted_name)
-
-    return Rows(
-        expected, gathered(observation, "observation"), values["action"], offsets, sorted_name, rewards=values.get("reward"),
-        terminated=values.get("terminated"), truncated=values.get("truncated"),
-        next_observations=None if next_observation is None else gathered(next_observation, "next observation"), last=last,
-    ).episodes()  # fmt: skip
+def _roles(what: str, names: Any) -> dict[str, str]:
+    """What each column of the observations is called in a message -> its name."""
+    return {f"{what} {i}" if i else what: one for i, one in enumerate(_names(names))}
 
 
 def _names(observation: Any) -> list[str]:
     """Every column that observations are read from."""
     if isinstance(observation, str):
         return [observation]
-    if isinstance(observation, Mapping):
-        return [name for part in observation.values() for name in _names(part)]
-    if isinstance(observation, Sequence) and len(observation):
-        return [name for part in observation for name in _names(part)]
+    if isinstance(observation, Mapping | Sequence) and len(observation):
+        parts = observation.values() if isinstance(observation, Mapping) else observation
+        return [name for part in parts for name in _names(part)]
     raise InvalidParameter(
         f"observation is {observation!r}: expected a column's name, a list of names or a dictionary of them."
     )
@@ -135,87 +130,85 @@ def _names(observation: Any) -> list[str]:
 
 def _order(columns: dict[str, np.ndarray], n: int, name: Name) -> tuple[np.ndarray, np.ndarray]:
     """(n,) rows sorted by episode and step, and (N + 1,) where each episode starts among them."""
-    import pandas as pd
-
     if "episode" in columns:
-        try:
-            codes, _ = pd.factorize(columns["episode"])
-        except TypeError as error:
-            raise InvalidDemonstrations(f"the column of episodes holds lists ({error}): expected numbers or names.") from error
-        if (codes < 0).any():
-            raise InvalidDemonstrations(f"{name(int(np.argmax(codes < 0)))} has no episode: expected an id. Is the row empty?")
+        codes, _ = _factorized(columns["episode"], "episode", name)
     else:
-        flags = [truths(columns[key], key, name) for key in ("terminated", "truncated") if key in columns]
-        ended = np.any(flags, axis=0) if flags else np.zeros(n, dtype=bool)
-        codes = np.concatenate([[0], np.cumsum(ended)[:-1]])
-    steps = None
-    order = np.argsort(codes, kind="stable")
-    if "step" in columns:
-        steps = numbers(columns["step"], "step", name)
-        if steps.ndim > 1:
-            raise InvalidDemonstrations("the column of steps holds lists: expected whole numbers.")
-        wrong = np.flatnonzero(~((steps > -(2**53)) & (steps < 2**53) & (steps == np.floor(steps))))
-        if wrong.size:
-            raise InvalidDemonstrations(
-                f"{name(int(wrong[0]))} has step {steps[wrong[0]].item()}: expected a whole number between -2^53 and 2^53."
-            )
-        order = np.lexsort((steps, codes))
-    codes = codes[order]
+        flags = [truths(columns[key], key, name) for key in FLAGS if key in columns]
+        codes = np.cumsum(np.any(flags, axis=0)) - np.any(flags, axis=0) if flags else np.zeros(n, dtype=np.int64)
+    steps = whole_numbers(columns["step"], "step", name) if "step" in columns else np.zeros(n, dtype=np.int64)
+    order = np.lexsort((steps, codes))
+    codes, steps = codes[order], steps[order]
     same = codes[1:] == codes[:-1]
-    if steps is not None:
-        steps = steps[order].astype(np.int64)
-        wrong = np.flatnonzero(same & (np.diff(steps) != 1))
-        if wrong.size:
-            at = int(wrong[0])
-            before, here = int(order[at]), int(order[at + 1])
-            what = (
-                f"step {steps[at + 1]} again, as {name(before)} has" if steps[at] == steps[at + 1] else f"step {steps[at + 1]}"
-            )
-            raise InvalidDemonstrations(
-                f"{name(here)} has {what}: expected step {steps[at] + 1} after step {steps[at]} of its episode. Pass step=None "
-                "if the rows are in order and the column is no counter."
-            )
-    return order, np.concatenate([[0], np.flatnonzero(~same) + 1, [n]]).astype(np.int64)
+    wrong = np.flatnonzero(same & (np.diff(steps) != 1)) if "step" in columns else []
+    if len(wrong):
+        at = int(wrong[0])
+        again = f" again, as {name(int(order[at]))} has" if steps[at] == steps[at + 1] else ""
+        raise InvalidDemonstrations(
+            f"{name(int(order[at + 1]))} has step {steps[at + 1]}{again}: expected step {steps[at] + 1} after step {steps[at]} "
+            "of its episode. Pass step=None if the rows are in order and the column is no counter."
+        )
+    return order, offsets_at(np.append(~same, True))
 
 
-def _gathered(frame: Any, order: np.ndarray, space: spaces.Space, names: Any, what: str, name: Name) -> Any:
-    """The columns of observations, in a layout that `members` takes."""
-    if isinstance(names, Mapping):
-        parts = space.spaces if isinstance(space, spaces.Dict) else {}
-        if set(names) != set(parts):
-            raise InvalidParameter(f"{what} names the columns of {sorted(names)}: expected those of {space}.")
-        return {key: _gathered(frame, order, parts[key], one, f"{what}[{key!r}]", name) for key, one in names.items()}
-    if isinstance(space, spaces.Dict):
-        raise InvalidParameter(f"{what} is {names!r}: expected a dictionary with columns for each key of {space}.")
-    if not isinstance(names, str) and isinstance(space, spaces.Tuple):
-        if len(names) != len(space.spaces):
-            raise InvalidParameter(
-                f"{what} names {len(names)} columns: expected {len(space.spaces)}, one for each part of {space}."
-            )
-        parts = zip(space.spaces, names, strict=True)
-        return tuple(_gathered(frame, order, part, one, f"{what}[{i}]", name) for i, (part, one) in enumerate(parts))
-    if isinstance(names, str):
-        column = frame[names].to_numpy()[order]
-        texts = column.dtype.kind in "OUT" and isinstance(column[0], str)
-        return _parsed(column, what, name) if texts else column
-    return np.stack([numbers(frame[one].to_numpy()[order], f"{what} {one!r}", name) for one in names], axis=1)
-
-
-def _parsed(column: np.ndarray, what: str, name: Name) -> np.ndarray:
-    """(n, k) numbers out of texts; each different text is read once."""
+def _factorized(column: np.ndarray, what: str, name: Name) -> tuple[np.ndarray, Any]:
+    """(n,) numbers of the different values of a column, in the order in which they appear, and these."""
     import pandas as pd
 
-    codes, texts = pd.factorize(column)
+    try:
+        codes, values = pd.factorize(column)
+    except TypeError as error:
+        raise InvalidDemonstrations(f"the column of {what}s holds lists ({error}): expected numbers or text.") from error
     if (codes < 0).any():
         raise InvalidDemonstrations(f"{name(int(np.argmax(codes < 0)))} has no {what}: expected one. Is the row empty?")
-    rows = []
-    for i, text in enumerate(texts):
-        try:
-            rows.append([_WORDS[word] if word in _WORDS else float(word) for word in text.translate(_SIGNS).split()])
-        except (ValueError, AttributeError) as error:
-            row = int(np.argmax(codes == i))
-            raise InvalidDemonstrations(f"{name(row)} has {what} {text!r}: expected numbers, such as '(13, 10, 0)'.") from error
-        if len(rows[-1]) != len(rows[0]):
-            row = int(np.argmax(codes == i))
-            raise InvalidDemonstrations(f"{name(row)} has {what} {text!r}: expected {len(rows[0])} numbers, as in {name(0)}.")
-    return np.array(rows)[codes]
+    return codes, values
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """The columns that are read, sorted."""
+
+    columns: dict[str, np.ndarray]
+    """(n,) by name."""
+    name: Name
+    """Says where a row stands in the source."""
+
+    def gathered(self, space: spaces.Space, names: Any, what: str) -> Any:
+        """The columns of observations, in a layout that `members` takes."""
+        if isinstance(names, Mapping):
+            parts = space.spaces if isinstance(space, spaces.Dict) else {}
+            if set(names) != set(parts):
+                raise InvalidParameter(f"{what} names the columns of {sorted(names)}: expected those of {space}.")
+            return {key: self.gathered(parts[key], one, f"{what}[{key!r}]") for key, one in names.items()}
+        if isinstance(space, spaces.Dict):
+            raise InvalidParameter(f"{what} is {names!r}: expected a dictionary with columns for each key of {space}.")
+        if isinstance(names, str):
+            return self._single(names, what)
+        if isinstance(space, spaces.Tuple):
+            if len(names) != len(space.spaces):
+                raise InvalidParameter(
+                    f"{what} names {len(names)} columns: expected {len(space.spaces)}, one for each part of {space}."
+                )
+            parts = zip(space.spaces, names, strict=True)
+            return tuple(self.gathered(part, one, f"{what}[{i}]") for i, (part, one) in enumerate(parts))
+        return np.stack([numbers(self.columns[one], f"{what} {one!r}", self.name) for one in names], axis=1)
+
+    def _single(self, column: str, what: str) -> np.ndarray:
+        """(n,) or (n, k) values of one column; texts of numbers are read, each different text once."""
+        import pandas as pd
+
+        values = self.columns[column]
+        if pd.api.types.infer_dtype(values, skipna=True) != "string":
+            return values
+        codes, texts = _factorized(values, what, self.name)
+        rows = []
+        for i, text in enumerate(texts):
+            try:
+                rows.append([_WORDS[word] if word in _WORDS else float(word) for word in text.translate(_SIGNS).split()])
+            except ValueError:
+                rows.append([])
+            if not rows[-1] or len(rows[-1]) != len(rows[0]):
+                where = self.name(int(np.argmax(codes == i)))
+                even = f"{len(rows[0])} numbers, as in {self.name(0)}."
+                wanted = even if rows[-1] else f"numbers, such as '(13, 10, 0)'. {NO_WORDS}"
+                raise InvalidDemonstrations(f"{where} has {what} {shown(text)}: expected {wanted}")
+        return np.array(rows)[codes]

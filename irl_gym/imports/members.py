@@ -4,7 +4,7 @@ Observations come in many layouts: a list of what an environment returned, array
 matrix with a column for each number. All become the stacked layout, in the space's dtype. Axes: n rows.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import singledispatch
 from typing import Any
 
@@ -13,85 +13,7 @@ from gymnasium import spaces
 
 from irl_gym.errors import InvalidDemonstrations, NotDiscrete
 from irl_gym.features import batch_size
-
-Name = Callable[[int], str]
-"""Says where a row stands, in the words of the source: `row 17 (line 18 of log.csv)`."""
-
-
-def as_array(raw: Any, what: str) -> np.ndarray:
-    """Any array, of any type.
-
-    Raises:
-        InvalidDemonstrations: rows of several lengths.
-    """
-    try:
-        return np.asarray(raw)
-    except ValueError as error:
-        raise InvalidDemonstrations(f"the {what} are rows of several lengths: expected rows of one length.") from error
-
-
-def is_list(raw: Any) -> bool:
-    """Has it a length and positions, as arrays, lists and tuples have?"""
-    sized = hasattr(raw, "__len__") and hasattr(raw, "__getitem__") and not isinstance(raw, str | bytes | Mapping)
-    return sized and getattr(raw, "shape", None) != ()
-
-
-def numbers(raw: Any, what: str, name: Name) -> np.ndarray:
-    """Rows of numbers as an array of integers or floats; booleans count as 0 and 1.
-
-    Raises:
-        InvalidDemonstrations: rows of different shapes, or a value that is no number, named by its row.
-    """
-    try:
-        array = np.asarray(raw)
-        if array.dtype.kind == "O" and array.ndim == 1 and len(array) and np.ndim(array[0]):
-            array = np.asarray(array.tolist())  # an array of arrays
-    except (ValueError, TypeError) as error:
-        raise _ragged(raw, what, name) from error
-    if array.dtype.kind == "b":
-        return array.astype(np.int64)
-    if array.dtype.kind in "iuf":
-        return array
-    try:
-        if array.dtype.kind not in "OUST":
-            raise TypeError(array.dtype)
-        return array.astype(np.float64)
-    except (ValueError, TypeError) as error:
-        rows = array if array.ndim else array[None]
-        for row, value in enumerate(rows):
-            if not _is_numeric(value):
-                raise InvalidDemonstrations(f"{name(row)} has {what} {_shown(value)}: expected numbers.") from error
-        raise InvalidDemonstrations(f"the {what}s have dtype {array.dtype}: expected numbers.") from error
-
-
-def _is_numeric(value: Any) -> bool:
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind in "OUST":
-            array.astype(np.float64)
-    except (ValueError, TypeError):
-        return False
-    return array.dtype.kind in "biufOUST"
-
-
-def _ragged(raw: Any, what: str, name: Name) -> InvalidDemonstrations:
-    shapes = []
-    for row, value in enumerate(raw):
-        try:
-            shapes.append(np.shape(value))
-        except ValueError:
-            return InvalidDemonstrations(f"{name(row)} has {what} {_shown(value)}: expected rows of one length.")
-        if shapes[-1] != shapes[0]:
-            return InvalidDemonstrations(
-                f"{name(row)} has {what} {_shown(value)} of shape {shapes[-1]}: expected shape {shapes[0]}, as in {name(0)}."
-            )
-    return InvalidDemonstrations(f"the {what}s cannot be read as rows of numbers: expected one row a step.")
-
-
-def _shown(value: Any) -> str:
-    """A value on one short line."""
-    text = " ".join(repr(value.tolist() if isinstance(value, np.ndarray | np.generic) else value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
+from irl_gym.imports.values import Name, is_list, numbers, shown
 
 
 @singledispatch
@@ -162,7 +84,7 @@ def members(space: spaces.Space, raw: Any, what: str, name: Name) -> Any:
     if wrong.size:
         row = int(wrong[0])
         raise InvalidDemonstrations(
-            f"{name(row)} has {what} {_shown(array[row])}: expected a member of {space}. Was it recorded in another "
+            f"{name(row)} has {what} {shown(array[row])}: expected a member of {space}. Was it recorded in another "
             "environment, or is a value missing?"
         )
     return typed.astype(space.dtype, copy=False)
@@ -192,7 +114,7 @@ def _columns_of_tuples(space: spaces.Tuple, raw: Any, what: str, name: Name) -> 
     for row, one in enumerate(rows):
         if not is_list(one) or len(one) != len(space.spaces):
             raise InvalidDemonstrations(
-                f"{name(row)} has {what} {_shown(one)}: expected {len(space.spaces)} parts, a member of {space}."
+                f"{name(row)} has {what} {shown(one)}: expected {len(space.spaces)} parts, a member of {space}."
             )
     return tuple([one[i] for one in rows] for i in range(len(space.spaces)))
 
@@ -204,7 +126,7 @@ def _(space: spaces.Dict, raw: Any, what: str, name: Name) -> Any:
         for row, one in enumerate(rows):
             if not isinstance(one, Mapping) or set(one) != set(space.spaces):
                 raise InvalidDemonstrations(
-                    f"{name(row)} has {what} {_shown(one)}: expected the keys {list(space.spaces)}, a member of {space}."
+                    f"{name(row)} has {what} {shown(one)}: expected the keys {list(space.spaces)}, a member of {space}."
                 )
         raw = {key: [one[key] for one in rows] for key in space.spaces}
     if set(raw) != set(space.spaces):

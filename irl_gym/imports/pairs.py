@@ -5,6 +5,7 @@ nothing behind when a pair is refused.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -13,8 +14,9 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
-from irl_gym.imports.expected import Expected, expect
-from irl_gym.imports.rows import Last, Rows, check_last, truths
+from irl_gym.imports.reading import Last, Reading, reading
+from irl_gym.imports.rows import Rows
+from irl_gym.imports.values import truths
 
 FIELDS = ("observation", "action", "reward", "episode", "terminated", "truncated")
 FLAGS = FIELDS[4:]
@@ -53,23 +55,23 @@ def from_pairs(
         InvalidParameter: spaces that are missing, or unknown fields.
         NotDiscrete: continuous actions.
     """
-    check_last(last)
-    if fields is not None and not (isinstance(fields, Sequence) and all(isinstance(one, str) for one in fields)):
-        raise InvalidParameter(f"fields are {fields!r}: expected a tuple of names out of {FIELDS}.")
+    how = reading(space, n_actions, action_space, env, last)
     if not isinstance(pairs, Iterable):
         raise InvalidDemonstrations(f"the pairs are {type(pairs).__name__}: expected something to iterate over.")
-    if fields is not None and (set(fields) - set(FIELDS) or len(set(fields)) < len(fields) or set(FIELDS[:2]) - set(fields)):
-        raise InvalidParameter(f"fields are {tuple(fields)}: expected observation, action and others of {FIELDS}, once each.")
-    return _episodes(pairs, None if fields is None else tuple(fields), last, expect(space, n_actions, action_space, env))
+    names = list(fields) if isinstance(fields, Sequence) else []
+    known = all(one in FIELDS and names.count(one) == 1 for one in names)
+    if fields is not None and not (known and set(FIELDS[:2]) <= set(names)):
+        raise InvalidParameter(f"fields are {fields!r}: expected observation, action and others of {FIELDS}, once each.")
+    return _episodes(pairs, tuple(names), how)
 
 
-def _episodes(pairs: Iterable[Any], fields: tuple[str, ...] | None, last: Last, expected: Expected) -> Iterator[Episode]:
+def _episodes(pairs: Iterable[Any], fields: tuple[str, ...], how: Reading) -> Iterator[Episode]:
     steps: list[dict[str, Any]] = []
     number, first, closed = -1, 0, False
     for number, pair in enumerate(pairs):
         if pair is None:
             if steps:
-                yield _episode(steps, first, last, expected)
+                yield _episode(steps, first, how)
             steps, closed = [], False
             continue
         step = _step(pair, fields, number)
@@ -77,25 +79,24 @@ def _episodes(pairs: Iterable[Any], fields: tuple[str, ...] | None, last: Last, 
         follows = bool(steps) and step.get("episode") == steps[-1].get("episode")
         ended = any(truths([step[key]], key, lambda _, n=number: _name(n))[0] for key in FLAGS if step.get(key) is not None)
         if steps and (not follows or (closed and not final and "episode" not in step)):
-            yield _episode(steps, first, last, expected)
+            yield _episode(steps, first, how)
             steps = []
         first = first if steps else number
         steps.append(step)
         closed = ended
         if final:
-            yield _episode(steps, first, "row", expected)
+            yield _episode(steps, first, replace(how, last="row"))
             steps, closed = [], False
     if steps:
-        yield _episode(steps, first, last, expected)
+        yield _episode(steps, first, how)
     if number < 0:
         raise InvalidDemonstrations("there are no pairs: expected at least one.")
 
 
-def _step(pair: Any, fields: tuple[str, ...] | None, number: int) -> dict[str, Any]:
-    names = fields if fields is not None else FIELDS[:3]
-    known = isinstance(pair, tuple | list) and (len(pair) == len(names) or (fields is None and len(pair) == 2))
-    if not known:
-        also = " or (observation, action)" if fields is None else ""
+def _step(pair: Any, fields: tuple[str, ...], number: int) -> dict[str, Any]:
+    names = fields or FIELDS[:3]
+    if not isinstance(pair, tuple | list) or len(pair) not in ((len(fields),) if fields else (2, 3)):
+        also = "" if fields else " or (observation, action)"
         raise InvalidDemonstrations(f"{_name(number)} is {pair!r}: expected ({', '.join(names)}){also}.")
     step = dict(zip(names, pair, strict=False))
     episode = step.get("episode")
@@ -110,31 +111,28 @@ def _name(number: int) -> str:
     return f"pair {number} (from 0)"
 
 
-def _episode(steps: list[dict[str, Any]], first: int, last: Last, expected: Expected) -> Episode:
-    def column(key: str, filler: Any = None) -> list[Any] | None:
-        values = [step.get(key) for step in steps]
-        if all(value is None for value in values):
-            return None
-        if last == "row" and values[-1] is None:
-            values[-1] = filler
-        return values
+def _episode(steps: list[dict[str, Any]], first: int, how: Reading) -> Episode:
+    """One episode, of which `first` is the number of the first pair."""
 
     def name(row: int) -> str:
         return _name(first + row)
 
-    for key in ("reward", "terminated", "truncated"):
-        values = column(key, 0)
-        missing = [row for row, value in enumerate(values or []) if value is None]
+    columns: dict[str, Any] = {}
+    for column, key in {"rewards": "reward", "terminated": "terminated", "truncated": "truncated"}.items():
+        values = [step.get(key) for step in steps]
+        if all(value is None for value in values):
+            continue
+        if how.last == "row" and values[-1] is None:
+            values[-1] = 0  # not read
+        missing = [row for row, value in enumerate(values) if value is None]
         if missing:
             raise InvalidDemonstrations(
                 f"{name(missing[0])} has no {key}: expected one in every pair of an episode, or in none."
             )
-    observations = [step["observation"] for step in steps]
-    actions = (
-        np.array([step["action"] for step in steps], dtype=object) if last == "row" else [step["action"] for step in steps]
-    )
+        columns[column] = values
+    actions = [step["action"] for step in steps]
     (episode,) = Rows(
-        expected, observations, actions, np.array([0, len(steps)]), name, rewards=column("reward", 0),
-        terminated=column("terminated", False), truncated=column("truncated", False), last=last,
+        how, np.array([0, len(steps)]), name, [step["observation"] for step in steps],
+        np.array(actions, dtype=object) if how.last == "row" else actions, **columns,
     ).episodes()  # fmt: skip
     return episode

@@ -1,8 +1,7 @@
 """Demonstrations of the package `imitation`, and of the D4RL collection, in the layouts that they keep them in."""
 
 import os
-from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,11 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations
-from irl_gym.imports.arrays import from_arrays
+from irl_gym.imports.arrays import episodes_of
 from irl_gym.imports.cutting import from_lists
-from irl_gym.imports.expected import expect
-from irl_gym.imports.members import as_array, is_list
-from irl_gym.imports.rows import Last
+from irl_gym.imports.files import closest
+from irl_gym.imports.reading import Last, reading
+from irl_gym.imports.values import as_array, is_list
 
 
 def from_imitation(
@@ -47,7 +46,7 @@ def from_imitation(
         InvalidParameter: spaces that are missing.
         NotDiscrete: continuous actions.
     """
-    expected = expect(space, n_actions, action_space, env)
+    how = reading(space, n_actions, action_space, env, noun="trajectory")
     every = [trajectories] if hasattr(trajectories, "acts") or isinstance(trajectories, Mapping) else trajectories
     if not isinstance(every, Iterable):
         raise InvalidDemonstrations(f"the trajectories are {type(every).__name__}: expected a list of them.")
@@ -63,9 +62,15 @@ def from_imitation(
         )
     stopped = np.array([_timed_out(one["infos"]) for one in fields])
     ended = np.array([_flag(one["terminal"], i) for i, one in enumerate(fields)])
-    columns = {"rewards": None if unpaid else rewards, "terminated": ended & ~stopped, "truncated": stopped}
-    observations = [one["obs"].unwrap() if hasattr(one["obs"], "unwrap") else one["obs"] for one in fields]  # its dictionaries
-    return from_lists(expected, observations, [one["acts"] for one in fields], columns, "drop", "trajectory")
+    observations = [one["obs"] for one in fields]  # where they are dictionaries, imitation wraps them
+    columns = {
+        "observations": [one.unwrap() if hasattr(one, "unwrap") else one for one in observations],
+        "actions": [one["acts"] for one in fields],
+        "rewards": None if unpaid else rewards,
+        "terminated": ended & ~stopped,
+        "truncated": stopped,
+    }
+    return from_lists(how, columns)
 
 
 def _field(trajectory: Any, key: str, number: int) -> Any:
@@ -122,21 +127,19 @@ def from_d4rl(
         InvalidParameter: spaces that are missing.
         NotDiscrete: continuous actions.
     """
-    expect(space, n_actions, action_space, env)  # before a large file is read
+    how = reading(space, n_actions, action_space, env, last)  # before a large file is read
     if not isinstance(source, Mapping | str | os.PathLike):
         raise InvalidDemonstrations(f"the source is {type(source).__name__}: expected a dictionary of arrays, or a path.")
     arrays = source if isinstance(source, Mapping) else _read_hdf5(Path(source))
     for key in ("observations", "actions", "terminals"):
         if key not in arrays:
-            close = get_close_matches(key, map(str, arrays), 1, 0.5)
-            mend = f"Rename {close[0]!r}." if close else "Is it a D4RL dataset?"
+            close = closest(key, map(str, arrays))
+            mend = f"Rename {close!r}." if close else "Is it a D4RL dataset?"
             raise InvalidDemonstrations(f"there is no {key!r} among {sorted(map(str, arrays))}: expected D4RL's arrays. {mend}")
-    return from_arrays(
-        arrays["observations"], as_array(arrays["actions"], "actions"), rewards=arrays.get("rewards"),
-        terminated=arrays["terminals"], truncated=arrays.get("timeouts"),
-        ends=_either(arrays["terminals"], arrays.get("timeouts")), next_observations=arrays.get("next_observations"),
-        last=last, space=space, n_actions=n_actions, action_space=action_space, env=env,
-    )  # fmt: skip
+    columns = {key: arrays.get(key) for key in ("observations", "rewards", "next_observations")}
+    columns |= {"actions": as_array(arrays["actions"], "actions")}
+    columns |= {"terminated": arrays["terminals"], "truncated": arrays.get("timeouts")}
+    return episodes_of(how, columns, {"ends": _either(arrays["terminals"], arrays.get("timeouts"))})
 
 
 def _either(terminals: Any, timeouts: Any) -> np.ndarray:
@@ -154,21 +157,12 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
         raise DatasetMissing(f"{path} is not a file: expected an HDF5 file with D4RL's arrays.")
     try:
         with h5py.File(path, "r") as file:
-            return _read_group(file)
+            return _read_group(file, ("observations", "next_observations"))
     except OSError as error:
         raise InvalidDemonstrations(f"{path} cannot be read ({error}): expected an HDF5 file with D4RL's arrays.") from error
 
 
-def _read_group(group: Any) -> dict[str, Any]:
-    """Arrays by name; `observations` may be a group, of a Dict space. What is only about the collection is left where it is."""
-    read = {}
-    for key, value in group.items():
-        if key in ("observations", "next_observations") and hasattr(value, "items"):
-            read[key] = _read_arrays(value)
-        elif not hasattr(value, "items"):
-            read[key] = value[()]
-    return read
-
-
-def _read_arrays(group: Any) -> dict[str, Any]:
-    return {key: _read_arrays(value) if hasattr(value, "items") else value[()] for key, value in group.items()}
+def _read_group(group: Any, groups: Container[str]) -> dict[str, Any]:
+    """Arrays by name, and of some groups: observations of a Dict space are one. Others are only about the collection."""
+    named = {key: value for key, value in group.items() if key in groups or not hasattr(value, "items")}
+    return {key: _read_group(one, one) if hasattr(one, "items") else one[()] for key, one in named.items()}

@@ -84,6 +84,12 @@ def test_columns_that_may_be_episodes_of_a_step_are_refused():
     assert [len(one) for one in from_arrays(*columns, lengths=[1, 1], last="repeat", **LAKE)] == [1, 1]
 
 
+def test_tuples_are_read_as_lists_are():
+    assert seen(from_arrays((0, 4, 8, 0, 1), (1, 1, 2), lengths=(2, 1), terminated=(True, False), **LAKE)) == WHOLE
+    padded = from_arrays(((0, 4, 8), (0, 1, 2)), np.array([[1, 1], [2, 2]]), **LAKE)
+    assert [one.observations.tolist() for one in padded] == [[0, 4, 8], [0, 1, 2]]
+
+
 def test_padded_episodes_of_a_step_stay_so():
     assert len(from_arrays(np.array([[0, 4], [0, 1]]), np.array([[1], [2]]), terminated=[True, False], **LAKE)) == 2
 

@@ -1,0 +1,155 @@
+"""Distances between rewards that are functions R(observations, actions, next_observations), from samples.
+
+    sampled_pearson, sampled_spearman   on the rewards as they are, or with EPIC's canonical form
+    sampled_epic                        transitions, and states and actions drawn afresh
+    sampled_dard, sampled_starc         in `sampled_models`: they need a model to draw successors from
+Each gives a value with a standard error (see `jackknife`). The canonical form of EPIC is itself a mean over M draws, the same
+for all transitions; its scatter is part of the error, and M bounds how small the error can get. Axes: N transitions, M draws.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from irl_gym._typing import Numbers
+from irl_gym.checks import float_array
+from irl_gym.distances.comparing import ROUNDING
+from irl_gym.distances.jackknife import Distance, correlation_distance, jackknife
+from irl_gym.distances.transitions import FreshSample, Transitions
+from irl_gym.errors import InvalidReward
+from irl_gym.features import batch_size, take
+
+RewardCall = Callable[[Any, np.ndarray, Any], Any]
+"""R(observations, actions, next_observations) -> (N,) numbers."""
+
+BLOCKS = 50
+"""Blocks of transitions left out in turn."""
+DRAW_BLOCKS = 20
+"""Blocks of fresh draws left out in turn."""
+
+
+def paid(reward: RewardCall, observations: Any, actions: np.ndarray, next_observations: Any) -> Numbers:
+    """(N,) what a reward function says of transitions.
+
+    Raises:
+        InvalidReward: it gives another shape, or a value that is not finite.
+    """
+    values = float_array("what the reward function returns", reward(observations, actions, next_observations),
+                         "(N,) numbers", InvalidReward)  # fmt: skip
+    if values.shape != (len(actions),):
+        raise InvalidReward(
+            f"the reward function gives shape {values.shape} for {len(actions)} transitions: expected ({len(actions)},)."
+        )
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        raise InvalidReward(
+            f"the reward function gives {values[wrong[0]]} for transition {wrong[0]}: expected a finite number."
+        )
+    return values
+
+
+def sampled_epic(first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample) -> Distance:
+    """EPIC distance of two reward functions: N * M evaluations of each.
+
+    Args:
+        first: R(observations, actions, next_observations) -> (N,).
+        second: the other.
+        transitions: from the coverage distribution D.
+        fresh: states from D_S, actions from D_A, and gamma.
+
+    Raises:
+        InvalidReward: a function that gives another shape, or a value that is not finite.
+        UndefinedDistance: a canonical reward that is constant on the transitions.
+    """
+    return sampled_pearson(first, second, transitions, fresh)
+
+
+def sampled_pearson(
+    first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None = None
+) -> Distance:
+    """Pearson distance of two reward functions, as they are, or in EPIC's canonical form where `fresh` is given.
+
+    Raises:
+        InvalidReward: a function that gives another shape, or a value that is not finite.
+        UndefinedDistance: a reward that is constant on the transitions.
+    """
+    return _correlated(first, second, transitions, fresh, ranked=False)
+
+
+def sampled_spearman(
+    first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None = None
+) -> Distance:
+    """Spearman distance of two reward functions, as they are, or in EPIC's canonical form where `fresh` is given.
+
+    Raises:
+        InvalidReward: a function that gives another shape, or a value that is not finite.
+        UndefinedDistance: a reward that is constant on the transitions.
+    """
+    return _correlated(first, second, transitions, fresh, ranked=True)
+
+
+def _correlated(
+    first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None, *, ranked: bool
+) -> Distance:
+    forms = [_Canonical(reward, transitions, fresh) for reward in (first, second)]
+    x, y = (form.values(None) for form in forms)
+    rounding = max(form.rounding for form in forms)
+    value = correlation_distance(x, y, rounding, ranked=ranked)
+    block = transitions.blocks(BLOCKS)
+
+    def without_block(b: int) -> float:
+        return correlation_distance(x[block != b], y[block != b], rounding, ranked=ranked)
+
+    def without_draws(g: int) -> float:
+        return correlation_distance(forms[0].values(g), forms[1].values(g), rounding, ranked=ranked)
+
+    variance = jackknife(without_block, int(block.max()) + 1)
+    if fresh is not None:
+        variance += jackknife(without_draws, forms[0].n_blocks)
+    return Distance(value, float(np.sqrt(variance)), len(transitions))
+
+
+class _Canonical:
+    """The canonical values of a reward function on transitions, with any block of the fresh draws left out."""
+
+    def __init__(self, reward: RewardCall, transitions: Transitions, fresh: FreshSample | None):
+        here, following = transitions.observations, transitions.next_observations
+        self._given = paid(reward, here, transitions.actions, following)
+        self._fresh, self._going = fresh, ~transitions.ended
+        self.rounding = ROUNDING * float(np.abs(self._given).max())
+        if fresh is None:
+            return
+        self.n_blocks = min(DRAW_BLOCKS, len(fresh))
+        self._block = np.arange(len(fresh)) * self.n_blocks // len(fresh)
+        self._counts = np.bincount(self._block)
+        self._here = self._sums(reward, here, fresh)
+        self._next = self._sums(reward, following, fresh)
+        self._at_draws = self._sums(reward, fresh.states, fresh) if transitions.ended.any() else None
+        self.rounding = max(self.rounding, ROUNDING * float(np.abs(self._here).max()) / self._counts.min() / (1 - fresh.gamma))
+
+    def _sums(self, reward: RewardCall, observations: Any, fresh: FreshSample) -> np.ndarray:
+        """(N, blocks) sums of R(s, A, S') over the draws of each block."""
+        n = batch_size(observations)
+        sums = np.zeros((n, self.n_blocks))
+        for b in range(self.n_blocks):
+            draws = np.flatnonzero(self._block == b)
+            every, drawn = np.repeat(np.arange(n), draws.size), np.tile(draws, n)
+            values = paid(reward, take(observations, every), fresh.actions[drawn], take(fresh.states, drawn))
+            sums[:, b] = values.reshape(n, draws.size).sum(axis=1)
+        return sums
+
+    def values(self, without: int | None) -> Numbers:
+        """(N,) R + gamma W(s') - W(s); a constant that no correlation sees is left out where no transition ends."""
+        if self._fresh is None:
+            return self._given
+        used = np.arange(self.n_blocks) != (-1 if without is None else without)
+        gamma, count = self._fresh.gamma, self._counts[used].sum()
+        here, following = self._here[:, used].sum(axis=1) / count, self._next[:, used].sum(axis=1) / count
+        if self._at_draws is None:
+            return self._given + gamma * following - here
+        kept = used[self._block]
+        acting = ~self._fresh.ended[kept]
+        means = self._at_draws[kept][:, used].sum(axis=1) / count
+        future = (means * acting).mean() / (1 - gamma * acting.mean())  # E[W(S')]
+        return self._given + gamma * np.where(self._going, following + gamma * future, 0.0) - here - gamma * future

@@ -1,0 +1,161 @@
+"""DARD and STARC from samples, with a model that successors are drawn from.
+
+Their canonical values are means over draws that differ for each transition. K >= 2 replicates of each value are drawn, and
+products of different replicates used (`jackknife.replicated_distance`), so that the noise of few draws does not look like a
+difference between rewards. Axes: N transitions, K replicates.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from irl_gym.checks import checked_number
+from irl_gym.distances.comparing import ROUNDING
+from irl_gym.distances.jackknife import Distance, jackknife, replicated_distance
+from irl_gym.distances.models import Model
+from irl_gym.distances.sampled import BLOCKS, RewardCall, paid
+from irl_gym.distances.transitions import Transitions
+from irl_gym.errors import InvalidParameter
+from irl_gym.mdp import check_discount
+
+Acting = Callable[[Any, np.random.Generator], np.ndarray]
+"""A policy: (observations, rng) -> (N, ...) actions."""
+
+
+def sampled_dard(
+    first: RewardCall,
+    second: RewardCall,
+    transitions: Transitions,
+    *,
+    gamma: float,
+    model: Model,
+    actions: np.ndarray,
+    replicates: int = 8,
+    rng: np.random.Generator,
+) -> Distance:
+    """DARD distance of two reward functions.
+
+    Args:
+        first: R(observations, actions, next_observations) -> (N,).
+        second: the other.
+        transitions: from the coverage distribution D. Observations are arrays.
+        gamma: discount.
+        model: draws successors. Where s' is terminal it is followed by itself.
+        actions: (M, ...) actions from D_A, of which one is drawn for each replicate.
+        replicates: K, at least 2.
+        rng: for the draws.
+
+    Raises:
+        InvalidParameter: observations that are not arrays, or a number out of range.
+        InvalidReward: a function that gives another shape, or a value that is not finite.
+        UndefinedDistance: a canonical reward that is constant on the transitions.
+    """
+    gamma, K = check_discount(gamma), _replicates(replicates)
+    here, following = _array(transitions.observations), _array(transitions.next_observations)
+    ended, rewards = transitions.ended, (first, second)
+    values = np.empty((2, len(transitions), K))
+    given = [paid(reward, here, transitions.actions, following) for reward in rewards]
+    for k in range(K):
+        drawn = np.asarray(actions)[rng.integers(len(actions), size=len(transitions))]
+        after_here, _ = model(here, drawn, rng)
+        after_next = np.array(following)
+        after_next[~ended] = model(following, drawn, rng)[0][~ended]
+        for r, reward in enumerate(rewards):
+            more = paid(reward, following, drawn, after_next) - paid(reward, after_here, drawn, after_next)
+            values[r, :, k] = given[r] + gamma * more - paid(reward, here, drawn, after_here)
+    return _estimated(values, transitions, gamma, centred=True)
+
+
+def sampled_starc(
+    first: RewardCall,
+    second: RewardCall,
+    transitions: Transitions,
+    *,
+    gamma: float,
+    model: Model,
+    policy: Acting,
+    horizon: int,
+    replicates: int = 32,
+    rng: np.random.Generator,
+) -> Distance:
+    """STARC distance of two reward functions: value-adjusted levelling, L2 norms.
+
+    The advantage of (s, a) is estimated by rollouts of the policy, from (s, a) and from s; next observations are not used. Cut
+    at the horizon, values lack a share of up to gamma^horizon.
+
+    Args:
+        first: R(observations, actions, next_observations) -> (N,).
+        second: the other.
+        transitions: their pairs (s, a) are what is compared. Observations are arrays.
+        gamma: discount.
+        model: draws successors, and says which of them are terminal.
+        policy: of value-adjusted levelling; it has to take every action that matters, as random actions do.
+        horizon: steps of a rollout.
+        replicates: K, at least 2: pairs of rollouts from each (s, a). Returns scatter, so many are needed.
+        rng: for the draws.
+
+    Raises:
+        InvalidParameter: observations that are not arrays, or a number out of range.
+        InvalidReward: a function that gives another shape, or a value that is not finite.
+        UndefinedDistance: a canonical reward that is 0 on the transitions, or drowned in noise.
+    """
+    gamma, K = check_discount(gamma), _replicates(replicates)
+    steps = int(checked_number("horizon", horizon, "a whole number of at least 1", least=1, whole=True))
+    here, rewards = _array(transitions.observations), (first, second)
+    values = np.empty((2, len(transitions), K))
+    for k in range(K):
+        gains = _returns(rewards, model, policy, here, transitions.actions, gamma, steps, rng)
+        values[:, :, k] = gains - _returns(rewards, model, policy, here, None, gamma, steps, rng)
+    return _estimated(values, transitions, gamma, centred=False)
+
+
+def _returns(
+    rewards: tuple[RewardCall, ...],
+    model: Model,
+    policy: Acting,
+    here: np.ndarray,
+    begin: np.ndarray | None,
+    gamma: float,
+    steps: int,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """(2, N) discounted returns of one rollout from each state, with given first actions or the policy's."""
+    total = np.zeros((len(rewards), len(here)))
+    going, discount = np.ones(len(here), dtype=bool), 1.0
+    for t in range(steps):
+        drawn = begin if t == 0 and begin is not None else policy(here, rng)
+        following, ended = model(here, drawn, rng)
+        for r, reward in enumerate(rewards):
+            total[r, going] += discount * paid(reward, here[going], np.asarray(drawn)[going], following[going])
+        going = going & ~np.asarray(ended, dtype=bool)
+        here, discount = following, discount * gamma
+        if not going.any():
+            break
+    return total
+
+
+def _estimated(values: np.ndarray, transitions: Transitions, gamma: float, *, centred: bool) -> Distance:
+    """The distance of replicated canonical values (2, N, K), and its error."""
+    rounding = ROUNDING * float(np.abs(values).max()) / (1 - gamma)
+    block = transitions.blocks(BLOCKS)
+
+    def distance(kept: np.ndarray | slice) -> float:
+        return replicated_distance(values[0][kept], values[1][kept], rounding, centred=centred)
+
+    value = distance(slice(None))
+    variance = jackknife(lambda b: distance(block != b), int(block.max()) + 1)
+    return Distance(value, float(np.sqrt(variance)), len(transitions))
+
+
+def _replicates(replicates: Any) -> int:
+    return int(checked_number("replicates", replicates, "a whole number of at least 2", least=2, whole=True))
+
+
+def _array(observations: Any) -> np.ndarray:
+    if not isinstance(observations, np.ndarray):
+        raise InvalidParameter(
+            f"the observations are a {type(observations).__name__}: expected an array, which a model can step. Flatten them, "
+            "for example with `gymnasium.wrappers.FlattenObservation`."
+        )
+    return observations

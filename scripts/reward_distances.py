@@ -1,0 +1,118 @@
+"""Measure what EPIC, DARD and STARC say of rewards: figures of their papers, invariances, and how they follow regret."""
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from scipy.stats import rankdata
+
+from irl_gym import distances as known
+from irl_gym.distances.bounds import epic_bound
+from irl_gym.distances.gridworlds import gridworld, gridworld_rewards
+from irl_gym.distances.random_rewards import random_mdp, random_reward, redistributed, shaped
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.metrics import policy_value
+
+Measured = Literal["figure", "invariance", "regret", "bound"]
+CONSOLE = Console(width=120)
+DISTANCES = {
+    "STARC, VAL": known.STARC(),
+    "STARC, minimal norm": known.STARC(known.MinimalNorm()),
+    "STARC, VAL, L1": known.STARC(norm=1, metric=1),
+    "STARC, VAL, L infinity": known.STARC(norm=np.inf, metric=np.inf),
+    "EPIC": known.EPIC(),
+    "DARD": known.DARD(),
+    "Spearman": known.Spearman(),
+    "raw Pearson": known.Pearson(known.AsGiven()),
+}
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Measure what EPIC, DARD and STARC say of rewards."""
+
+    only: tuple[Measured, ...] = get_args(Measured)
+    """What to measure: EPIC's figure A.2(a), invariances, rank correlation with regret, EPIC's bound on regret."""
+    mdps: int = 200
+    """Random MDPs for the invariances and the bound."""
+    pairs: int = 1000
+    """Random MDPs, each with a pair of rewards, for the rank correlation with regret."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+
+def show(title: str, columns: Iterable[str], names: Iterable[str], cells: Iterable[Iterable[str]]) -> None:
+    """Print a table; each row has a name."""
+    table = Table(*columns, title=title)
+    for name, row in zip(names, cells, strict=True):
+        table.add_row(name, *row)
+    CONSOLE.print(table)
+
+
+def figure(_: Arguments) -> bool:
+    """The distances of EPIC's gridworlds."""
+    rewards = gridworld_rewards()
+    found = {name: known.distance_matrix(DISTANCES[name], gridworld(), rewards) for name in ("EPIC", "DARD", "STARC, VAL")}
+    for name, matrix in found.items():
+        show(f"3x3 gridworlds, {name}", (name, *rewards), rewards, ([f"{x:.4f}" for x in row] for row in matrix))
+    return bool(np.allclose(found["EPIC"][0, [1, 2, 4]], (0.0, 0.75, 0.1602), rtol=0, atol=5e-5))  # Dense, Center, Path
+
+
+def invariance(given: Arguments) -> bool:
+    """Scaling, shaping and S'-redistribution: the largest and smallest distances over random MDPs."""
+    rng, mdps = np.random.default_rng(given.seed), given.mdps
+    found = {name: np.zeros((mdps, 4)) for name in DISTANCES}
+    for i in track(range(mdps), "invariance", console=CONSOLE):
+        mdp = random_mdp(rng, int(rng.integers(4, 33)), int(rng.integers(2, 5)), float(rng.choice([0.5, 0.9, 0.99])))
+        R = rng.normal(size=(mdp.n_states, mdp.n_actions, mdp.n_states))
+        moved = redistributed(rng, mdp, R)
+        others = [7 * rng.random() * R, shaped(rng, mdp, R), moved, 3 * shaped(rng, mdp, moved)]
+        for name, distance in DISTANCES.items():
+            found[name][i] = known.distance_matrix(distance, mdp, [R, *others])[0, 1:]
+    cells = ([f"{x.max():.1e} ({x.min():.1e})" for x in values.T] for values in found.values())
+    columns = ("distance", "scaling", "shaping", "S'-redistribution", "all three")
+    show(f"from R to an equivalent reward, {mdps} random MDPs: largest (smallest)", columns, found, cells)
+    return max(found[name].max() for name in list(DISTANCES)[:4]) < 1e-8 and found["EPIC"][:, 2].min() > 1e-8
+
+
+def regret(given: Arguments) -> bool:
+    """Rank correlation of each distance with the regret of planning for the other reward, over the range of values."""
+    rng, pairs = np.random.default_rng(given.seed), given.pairs
+    found = np.zeros((pairs, 1 + len(DISTANCES)))
+    for i in track(range(pairs), "regret", console=CONSOLE):
+        mdp = random_mdp(rng)
+        first, end = random_reward(rng, mdp), random_reward(rng, mdp)
+        second = first + (end - first) * rng.integers(1, 17) / 16
+        R, other = ((mdp.P.toarray().reshape(one.shape) * one).sum(axis=2) for one in (first, second))
+        best, worst, got = (policy_value(mdp, R, policy_iteration(mdp, one).policy) for one in (R, -R, other))
+        found[i] = [(best - got) / (best - worst), *(d.distance(mdp, first, second) for d in DISTANCES.values())]
+    rho = dict(zip(DISTANCES, np.corrcoef(rankdata(found, axis=0).T)[0, 1:], strict=True))
+    show(f"regret in {pairs} random MDPs", ("distance", "rank correlation"), rho, ([f"{x:.3f}"] for x in rho.values()))
+    return bool(rho["STARC, VAL"] > rho["EPIC"])
+
+
+def bound(given: Arguments) -> bool:
+    """EPIC's theorem 4.9: regret is never above the bound."""
+    rng, found = np.random.default_rng(given.seed), []
+    for _ in track(range(given.mdps), "bound", console=CONSOLE):
+        mdp = random_mdp(rng, int(rng.integers(3, 13)), int(rng.integers(2, 5)), float(rng.choice([0.5, 0.9, 0.99])))
+        R, other = rng.normal(size=(2, mdp.n_states, mdp.n_actions, mdp.n_states))
+        found.append(epic_bound(mdp, R, R + rng.choice([0.1, 1.0, 10.0]) * other))
+    share = np.array([(b.regret / b.bound, b.regret / b.sharper) for b in found])
+    cells, columns = ([f"{(x > 1).sum()}", f"{x.max():.2g}"] for x in share.T), ("theorem 4.9", "violated", "regret / bound")
+    show(f"EPIC's bound, {given.mdps} random MDPs", columns, ("16 K |R|", "4 K |C(R) - mean|"), cells)
+    return bool((share <= 1).all())
+
+
+if __name__ == "__main__":
+    given = tyro.cli(Arguments, description=__doc__)
+    bars = {"figure": figure, "invariance": invariance, "regret": regret, "bound": bound}
+    kept = {name: bars[name](given) for name in given.only}
+    CONSOLE.print(", ".join(f"{name}: {'holds' if kept[name] else 'FAILS'}" for name in kept))
+    sys.exit(not all(kept.values()))

@@ -1,0 +1,104 @@
+"""What distances refuse, and how they say so."""
+
+import numpy as np
+import pytest
+from models import random_model
+
+from irl_gym.distances import EPIC, STARC, MinimalNorm, dard, distance_matrix, epic, pearson, spearman, starc
+from irl_gym.distances.bounds import epic_bound
+from irl_gym.distances.random_rewards import shaped
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward, UndefinedDistance
+from irl_gym.mdp import TabularMDP
+
+MODEL = random_model(0, 6, 2, "terminal")  # states 4 and 5 are terminal
+MDP, R = MODEL.mdp, MODEL.R
+ACTING = np.repeat(~MDP.terminal[:, None], 2, axis=1) / 8
+
+
+@pytest.mark.parametrize("distance", [epic, dard, starc, pearson, spearman])
+@pytest.mark.parametrize("wrong", [np.zeros(5), np.zeros((6, 3)), np.zeros((6, 2, 5)), np.zeros((1, 6, 2, 6)), np.array(1.0)])
+def test_a_reward_of_another_table_is_refused(distance, wrong):
+    with pytest.raises(InvalidReward, match=r"the second reward has shape .*: expected \(6,\), \(6, 2\) or \(6, 2, 6\)"):
+        distance(MDP, R, wrong)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_reward_that_is_not_finite_is_named(value):
+    wrong = np.zeros((6, 2))
+    wrong[3, 1] = value
+    with pytest.raises(InvalidReward, match=r"the first reward is (nan|inf) at \[3, 1\]"):
+        starc(MDP, wrong, R)
+
+
+def test_text_is_no_reward():
+    with pytest.raises(InvalidReward, match="cannot be read as numbers"):
+        epic(MDP, "sparse", R)
+
+
+@pytest.mark.parametrize("constant", [np.zeros(6), np.zeros((6, 2)), np.zeros((6, 2, 6))])
+@pytest.mark.parametrize("distance", [epic, dard, pearson, spearman])
+def test_a_constant_reward_has_no_correlation(distance, constant):
+    with pytest.raises(UndefinedDistance, match="the canonical form of the second reward has deviation 0"):
+        distance(MDP, R, constant)
+
+
+@pytest.mark.parametrize("distance", [epic, spearman])
+def test_a_potential_alone_has_no_correlation(distance):
+    with pytest.raises(UndefinedDistance, match="only a potential"):
+        distance(MDP, shaped(np.random.default_rng(0), MDP, np.zeros((6, 2, 6))), R)
+
+
+def test_the_reward_of_a_mapping_is_named():
+    with pytest.raises(UndefinedDistance, match="the canonical form of Zero"):
+        distance_matrix(EPIC(), MDP, {"True": R, "Zero": np.zeros(6)})
+
+
+@pytest.mark.parametrize("distance", [EPIC, STARC])
+@pytest.mark.parametrize(
+    ("coverage", "said"),
+    [
+        (np.full((6, 3), 1 / 18), r"coverage has shape \(6, 3\)"),
+        (np.zeros((6, 2)), "coverage misses all transitions"),
+        (np.eye(6)[[5]].repeat(2, axis=0).T / 2, "coverage misses all transitions"),
+        (np.where(MODEL.P == 0, 1.0, 0.0) / (MODEL.P == 0).sum(), "coverage misses all transitions"),
+        (ACTING / 2, "coverage sums to 0.5"),
+        (np.full((6, 2), 1 / 12), r"coverage\[4, 0\] is 0.0833, but state 4 is terminal"),
+        (-ACTING, r"coverage\[0, 0\] is -0.125"),
+        (np.where(ACTING, np.nan, 0), r"coverage\[0, 0\] is nan"),
+        ("uniform", "cannot be read as numbers"),
+    ],
+)
+def test_a_coverage_that_is_no_distribution_of_transitions_is_refused(distance, coverage, said, unchecked):
+    with pytest.raises(InvalidParameter, match=said):
+        distance(coverage=coverage).distance(MDP, R, -R)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"states": np.ones(5) / 5}, r"states has shape \(5,\): expected \(6,\)"),
+        ({"states": np.ones(6)}, "states sums to 6"),
+        ({"actions": [1.5, -0.5]}, r"actions\[1\] is -0.5"),
+    ],
+)
+def test_distributions_of_the_canonical_form_are_checked(given, said, unchecked):
+    with pytest.raises(InvalidParameter, match=said):
+        epic(MDP, R, -R, **given)
+
+
+@pytest.mark.parametrize("wrong", [0, 3, "2", True, None])
+def test_a_norm_is_1_2_or_infinite(wrong, unchecked):
+    with pytest.raises(InvalidParameter, match=r"metric is .*: expected 1, 2 or infinity"):
+        starc(MDP, R, -R, metric=wrong)
+
+
+@pytest.mark.parametrize("distance", [EPIC(), STARC(), STARC(MinimalNorm())])
+def test_a_table_without_transitions_has_no_distances(distance):
+    ended = TabularMDP(np.zeros((4, 2)), 0.9, [1, 0])
+    with pytest.raises(UndefinedDistance, match="every state is terminal"):
+        distance.distance(ended, np.ones(2), np.arange(2.0))
+
+
+def test_the_bound_is_for_tables_without_terminal_states():
+    with pytest.raises(InvalidMDP, match="state 4 is terminal"):
+        epic_bound(MDP, R, -R)

@@ -20,7 +20,7 @@ CELLS = {
     "Path": [0, -1, -1, 0, 0, 0, -1, -1, 4],
     "Cliff": [0, -1, -1, 0, 0, 0, -4, -4, 4],
 }
-"""What each cell pays; Dense is 4 Sparse - 1, and is shaped below. The distances that the paper prints single these numbers out:
+"""What each cell pays; Dense is 4 Sparse - 1, and is shaped below. Distances that the paper prints settle the numbers:
 Sparse-Path 0.1602 (figure A.2) the goal's 4, and Path-Cliff 0.27 (figure 2) the cliff's -4."""
 
 

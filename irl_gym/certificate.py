@@ -22,8 +22,29 @@ OPTIMAL_WITHIN = 1e-8
 is such a margin one."""
 
 
+class Proven:
+    """What every certificate says of the program's optimum."""
+
+    objective: float
+    dual_bound: float
+
+    @property
+    def duality_gap(self) -> float:
+        """dual_bound - objective: how far the reward can be from the optimum."""
+        return self.dual_bound - self.objective
+
+    @property
+    def optimality(self) -> str:
+        """The same in a line that a person reads."""
+        return f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum"
+
+    def to_json(self) -> dict[str, Any]:
+        """The certificate as json holds it: NaN becomes None."""
+        return plain(self, "duality_gap", "degenerate")
+
+
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Proven):
     """What a learned reward proves. States outside the reachable ones are not judged."""
 
     expert_optimal: bool
@@ -70,11 +91,6 @@ class Certificate:
     """(v,) how often the row's state was visited; NaN when that is not known."""
 
     @property
-    def duality_gap(self) -> float:
-        """dual_bound - objective: how far R can be from the LP's optimum."""
-        return self.dual_bound - self.objective
-
-    @property
     def degenerate(self) -> bool:
         """Is R zero or constant?"""
         return self.zero or self.constant
@@ -87,7 +103,7 @@ class Certificate:
         lines = [
             f"expert optimal under R   {optimal}",
             f"margins                  {span}",
-            f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
+            self.optimality,
         ]
         if np.isfinite(self.least_l1_norm):
             above = max(self.l1_norm - self.least_l1_norm, 0.0)
@@ -107,10 +123,6 @@ class Certificate:
             lines.append(f"unknown                  nothing is known of the expert in {self.unknown.size} reachable states")
         return "\n".join(lines)
 
-    def to_json(self) -> dict[str, Any]:
-        """The certificate as json holds it: NaN becomes None."""
-        return plain(self, "duality_gap", "degenerate")
-
 
 def plain(certificate: Any, *properties: str) -> dict[str, Any]:
     """The fields of a certificate, and some of its properties, as json holds them: NaN becomes None."""
@@ -124,7 +136,7 @@ def plain(certificate: Any, *properties: str) -> dict[str, Any]:
     return found
 
 
-def _comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
+def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
     """(n,) rows that a margin is taken over: not an equality, and not trivial for the reward's kind."""
     return ~comparisons.equal & ~comparisons.trivial if reward.on_states else ~comparisons.equal
 
@@ -193,40 +205,60 @@ def certify(
     discounted = Discounted(part.P_pi(comparisons.distribution), part.gamma)
     R = TabularReward(reward.values[rows])
     values = row_margins(part, comparisons, R, discounted)
-    usable = _comparable(comparisons, R)
+    usable = comparable(comparisons, R)
     least = least_per_state(values[usable], comparisons.states[usable], part.n_states)
-    rounding = tolerated(R, mdp.gamma)
     if y is not None:  # a trivial row bounds no margin, so its dual may not tighten D(y)
         y = np.where(usable | comparisons.equal, y, 0.0)
     violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))
-    worst = float(violations.max(initial=0.0))
     objective_states = _objective_states(comparisons, usable, margin_cap, counted, rows)
     margins = least[objective_states]
     total = float(np.minimum(margins, np.inf if margin_cap is None else margin_cap).sum())
     dual = DualBound(part, comparisons, discounted, R.on_states, objective_states, r_max, l1, margin_cap)
-    norm = float(np.abs(R.values).sum())
-    paid = R.values if R.on_states else R.values[~part.terminal]
-    tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
-    margin = np.full(mdp.n_states, np.nan)
-    margin[rows] = least
     return Certificate(
-        expert_optimal=bool(worst <= rounding),
-        worst_violation=worst,
-        margin=margin,
-        objective=total - l1 * norm,
+        objective=total - l1 * float(np.abs(R.values).sum()),
         dual_bound=dual.bound(y),
         l1=float(l1),
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if margin_cap is None else float(margin_cap),
-        l1_norm=norm,
         least_l1_norm=dual.least_l1_norm(y_l1),
-        constant=bool(np.ptp(paid) <= 1e-9 * r_max) if paid.size else True,
-        zero=bool(np.abs(paid).max(initial=0.0) <= 1e-9 * r_max),
         unconstrained=rows[np.isnan(least) & ~part.terminal],
-        inseparable=rows[np.unique(tied)],
-        marginless=rows[least <= rounding],
-        **violated_rows(violations, rounding, comparisons, rows, None),
+        **judged(mdp, part, rows, comparisons, R, least, violations, r_max),
     )
+
+
+def judged(
+    mdp: TabularMDP, part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, least: np.ndarray,
+    violations: np.ndarray, r_max: float, visits: np.ndarray | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """The fields of a certificate that do not depend on the program.
+
+    Args:
+        mdp: the whole MDP.
+        part: what can be reached of it.
+        rows: (r,) the states of the whole that are in the part.
+        comparisons: the rows of (4) in the part.
+        R: the reward on the part.
+        least: (r,) smallest margin of each state.
+        violations: (n,) of each row of (4).
+        r_max: bound on |R|.
+        visits: (S,) how often each state was visited; None when that is not known.
+    """
+    rounding, worst = tolerated(R, mdp.gamma), float(violations.max(initial=0.0))
+    paid = R.values if R.on_states else R.values[~part.terminal]
+    tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
+    margin = np.full(mdp.n_states, np.nan)
+    margin[rows] = least
+    return {
+        "expert_optimal": bool(worst <= rounding),
+        "worst_violation": worst,
+        "margin": margin,
+        "l1_norm": float(np.abs(R.values).sum()),
+        "constant": bool(np.ptp(paid) <= 1e-9 * r_max) if paid.size else True,
+        "zero": bool(np.abs(paid).max(initial=0.0) <= 1e-9 * r_max),
+        "inseparable": rows[np.unique(tied)],
+        "marginless": rows[least <= rounding],
+        **violated_rows(violations, rounding, comparisons, rows, visits),
+    }
 
 
 def tolerated(R: TabularReward, gamma: float) -> float:

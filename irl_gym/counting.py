@@ -20,14 +20,14 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.checks import checked_number
+from irl_gym.copies.calls import called, stepped
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.demonstrations import Episode, stacked
-from irl_gym.enumeration.trials import called
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP, check_discount
-from irl_gym.policies import Policy
+from irl_gym.policies import Policy, generator
 from irl_gym.rewards import TabularReward
 from irl_gym.tabulation import Evidence, Tabulation
 from irl_gym.tally import tally
@@ -216,8 +216,7 @@ def interact(env: gym.Env, steps: int, *, seed: int, policy: Policy | None = Non
         raise NotDiscrete(f"the action space is {env.action_space}: expected Discrete. Discretise the actions first.")
     checked_number("steps", steps, "a number of steps of at least 1", least=1, whole=True)
     checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True)
-    rng = np.random.default_rng([int(seed), 1])  # not the stream of the environment's own generator
-    choose = _random_actions(int(env.action_space.n), rng) if policy is None else _actions_of(policy)
+    choose = _random_actions(int(env.action_space.n), generator(seed)) if policy is None else _actions_of(policy)
     return _episodes(env, int(steps), int(seed), choose)
 
 
@@ -244,16 +243,11 @@ def _episodes(env: gym.Env, steps: int, seed: int, choose: Callable[[Any], int])
         terminated = truncated = False
         while not (terminated or truncated):
             action = choose(observation)
-            observation, reward, terminated, truncated = called(lambda action=action + first: _step(env, action))
+            observation, reward, terminated, truncated = stepped(env, action + first)
             observations.append(observation)
             actions.append(action)
             rewards.append(reward)
             truncated = truncated or (not terminated and len(actions) in (limit, left))
         left -= len(actions)
-        yield Episode(stacked(observations), np.array(actions), np.array(rewards), bool(terminated), bool(truncated), begin)
+        yield Episode(stacked(observations), np.array(actions), np.array(rewards), terminated, truncated, begin)
         begin = None
-
-
-def _step(env: gym.Env, action: int) -> tuple[Any, float, bool, bool]:
-    observation, reward, terminated, truncated, _ = env.step(action)
-    return observation, float(reward), bool(terminated), bool(truncated)

@@ -32,7 +32,7 @@ from irl_gym.mdp import check_discount
 from irl_gym.minari_files import spec_json
 from irl_gym.noise import Noisy, checked_epsilon, noisy
 from irl_gym.planners import SB3, Agent, load_agent, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.states import StateIndex
 from irl_gym.tabulate import tabulate
 from irl_gym.tabulation import Tabulation
@@ -231,5 +231,5 @@ def _noisy(agent: Agent, epsilon: float, n_actions: int, seed: int) -> Policy:
 
 
 def _random(env: gym.Env, n_actions: int, seed: int) -> Policy:
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     return Acting(lambda _: rng.integers(n_actions), n_actions, env.observation_space)

@@ -27,9 +27,9 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from irl_gym._typing import Matrix
 from irl_gym.errors import InvalidParameter, InvalidPolicy, NotDiscrete
 from irl_gym.features import batch_size, take
-from irl_gym.noise import boltzmann, checked_count, checked_temperature, generator
+from irl_gym.noise import boltzmann, checked_count, checked_temperature
 from irl_gym.planners import Agent, Algorithm, load_agent
-from irl_gym.policies import Policy, as_distribution
+from irl_gym.policies import Policy, as_distribution, generator
 from irl_gym.states import States
 
 

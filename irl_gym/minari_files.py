@@ -108,9 +108,10 @@ def told(spec: EnvSpec | None) -> str:
     named = identity(spec)
     if named is None:
         return "an environment without a spec"
-    words = [f"{name}={value!r}" for name, value in named[1].items()]
-    words += [f"the wrapper {one[0]}" for one in (named[2] if len(named) > 2 else ())]
-    return f"{named[0]} with {', '.join(words)}" if words else str(named[0])
+    env_id, kwargs, *more = named
+    words = [f"{name}={value!r}" for name, value in kwargs.items()]
+    words += [f"the wrapper {one[0]}" for wrappers in more for one in wrappers]
+    return f"{env_id} with {', '.join(words)}" if words else str(env_id)
 
 
 def _plain(value: Any) -> Any:

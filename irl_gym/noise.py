@@ -20,7 +20,7 @@ from irl_gym.checks import checked_number, float_array
 from irl_gym.dynamic_programming import Reward, backup, checked_reward, evaluate_policy, tied
 from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.mdp import TabularMDP
-from irl_gym.policies import Policy, as_distribution
+from irl_gym.policies import NOISE, Policy, as_distribution, generator
 
 TIE = 1e-9
 """Values this close, relative to the largest, are ties when nothing but rounding tells them apart."""
@@ -125,7 +125,7 @@ class Noisy:
             )
         checked_epsilon(self.epsilon)
         checked_count(self.n_actions)
-        object.__setattr__(self, "_rng", generator(self.seed))
+        object.__setattr__(self, "_rng", generator(self.seed, NOISE))
 
     def __reduce__(self) -> tuple:
         return type(self), (self.policy, self.epsilon, self.n_actions, self.seed)
@@ -147,15 +147,6 @@ class Noisy:
         others = np.minimum((draws[..., 1] * self.n_actions).astype(np.int64), self.n_actions - 1)
         taken = np.where(draws[..., 0] < self.epsilon, others, actions.astype(np.int64))
         return (taken if taken.ndim else np.int64(taken)), state
-
-
-def generator(seed: int) -> np.random.Generator:
-    """A generator of a seed.
-
-    Raises:
-        InvalidParameter: a seed that is not a whole number of at least 0.
-    """
-    return np.random.default_rng(int(checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True)))
 
 
 def checked_count(n_actions: int) -> int:

@@ -13,8 +13,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
+from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidPolicy
 from irl_gym.states import States
+
+ACTIONS = 1
+"""The stream of a seed that actions are drawn from."""
+NOISE = 2
+"""The one that decides where an expert errs, since whoever errs may draw actions of the same seed."""
 
 
 @runtime_checkable
@@ -91,6 +97,19 @@ def support(policy: Any, n_states: int, n_actions: int) -> ActionSets:
     return as_distribution(policy, n_states, n_actions) > 0
 
 
+def generator(seed: int, stream: int = ACTIONS) -> np.random.Generator:
+    """The generator of a policy's own draws.
+
+    An environment that is reset with the same seed draws from `default_rng(seed)`: a policy that did so too would foresee what
+    happens to it.
+
+    Raises:
+        InvalidParameter: a seed that is not a whole number of at least 0.
+    """
+    whole = int(checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True))
+    return np.random.default_rng([whole, stream])
+
+
 @dataclass(frozen=True, eq=False)
 class TabularPolicy:
     """A table of action probabilities that acts on observations, with Stable-Baselines3's `predict`."""
@@ -112,7 +131,7 @@ class TabularPolicy:
         checked = as_distribution(self.probabilities, self.states.n_states, np.shape(self.probabilities)[1])
         checked.setflags(write=False)
         object.__setattr__(self, "probabilities", checked)
-        object.__setattr__(self, "_rng", np.random.default_rng(self.seed))
+        object.__setattr__(self, "_rng", generator(self.seed))
 
     def __reduce__(self) -> tuple:
         return type(self), (self.probabilities, self.states, self.seed)

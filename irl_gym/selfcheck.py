@@ -18,6 +18,7 @@ from irl_gym._typing import Matrix
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.errors import NotTabular, TableMismatch, UnknownObservation
 from irl_gym.mdp import TabularMDP, entry_positions
+from irl_gym.policies import generator
 from irl_gym.states import States
 
 LEAST_P_VALUE = 1e-9
@@ -74,7 +75,7 @@ def compare_with_steps(
         TableMismatch: a step the table says is impossible, or frequencies that it makes all but impossible.
     """
     walker = _copy_of(env)
-    rng = np.random.default_rng([seed, 1])  # not the stream that reset(seed=seed) gives the environment
+    rng = generator(seed)
     A = mdp.n_actions
     first_action = int(getattr(walker.action_space, "start", 0))
     seen, paid, starts = np.empty((steps, 2), dtype=np.int64), np.empty(steps), []

@@ -20,7 +20,7 @@ from irl_gym.features import FeatureMap, batch_size, checked_features, over_rows
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.planners import Planner, ValueIteration
-from irl_gym.policies import Policy
+from irl_gym.policies import Policy, generator
 from irl_gym.rewarded_vec_env import check_steppable, normalised, rewarded
 from irl_gym.rollouts import maker_of, moments_of
 from irl_gym.sampling import Successors
@@ -134,7 +134,7 @@ class Simulator:
             horizon: steps.
             seed: of the episodes.
         """
-        policy = policy or RandomPolicy(self.n_actions, np.random.default_rng([seed, 1]))
+        policy = policy or RandomPolicy(self.n_actions, generator(seed))
         total = np.zeros((n, features.n_features))
         for time, who, phi in self._seen(policy, features, n, horizon, seed):
             total[who] += self.gamma**time * phi

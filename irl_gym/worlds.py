@@ -21,7 +21,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
 from irl_gym.noise import Noisy, noisy
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
@@ -152,7 +152,7 @@ class SteppedWorld:
     def random(self) -> RandomPolicy:
         """Uniformly random actions."""
         space: Any = self.env.action_space
-        return RandomPolicy(int(space.n), np.random.default_rng(self.seed))
+        return RandomPolicy(int(space.n), generator(self.seed))
 
     def planner(self, *, shaped: bool) -> Planner:
         """PPO, with settings that suit the observations."""

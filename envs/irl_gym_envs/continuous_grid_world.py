@@ -14,6 +14,7 @@ from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.physics import Moves
 from irl_gym_envs.grid_rendering import AGENT, AGENT_RIM, FLOOR, FRAME, GOAL, GOAL_FLOOR, circle, segment
 from irl_gym_envs.physics_vector_env import PhysicsVectorEnv
+from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode
 
 MOVES = np.array([(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)])
 """Direction (x, y) of each action: 0 up, 1 right, 2 down, 3 left."""
@@ -108,8 +109,7 @@ class ContinuousGridWorldEnv(gym.Env[np.ndarray, np.int64]):
         start: Literal["uniform"] | Sequence[float] = "uniform",
         render_mode: str | None = None,
     ):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidParameter(f"render_mode is {render_mode!r}: expected None or one of {self.metadata['render_modes']}.")
+        check_render_mode(render_mode, self.metadata)
         self.physics = ContinuousGridWorldPhysics(step_size, noise, goal, bool(terminal_goal), start)
         self.render_mode = render_mode
         self.observation_space = SQUARE.space
@@ -148,11 +148,7 @@ class ContinuousGridWorldEnv(gym.Env[np.ndarray, np.int64]):
     def render(self) -> Any:
         """The square from above as an (H, W, 3) uint8 picture; a tail shows where the agent came from."""
         if self.render_mode is None:
-            name = self.spec.id if self.spec else type(self).__name__
-            gym.logger.warn(
-                f'render was called without a render mode: make it with gym.make("{name}", render_mode="rgb_array").'
-            )
-            return None
+            return warn_of_no_render_mode(self, "rgb_array")
         return draw(self.physics.goal, self.state, self._came_from)
 
 

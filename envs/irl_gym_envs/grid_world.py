@@ -7,7 +7,6 @@ into a wall stays. Arriving in a cell pays: the goal or the pit reward, or in ev
 from collections.abc import Sequence
 from typing import Any, Literal
 
-import gymnasium as gym
 import numpy as np
 
 from irl_gym.errors import InvalidParameter
@@ -15,6 +14,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.tabular_env import TabularEnv
 from irl_gym_envs.grid_map import Cells, GridMap, make_map, walk
 from irl_gym_envs.grid_rendering import Picture, draw_text
+from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode
 
 
 class GridWorldEnv(TabularEnv):
@@ -60,8 +60,7 @@ class GridWorldEnv(TabularEnv):
         terminal_goal: bool = True,
         render_mode: str | None = None,
     ):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidParameter(f"render_mode is {render_mode!r}: expected None or one of {self.metadata['render_modes']}.")
+        check_render_mode(render_mode, self.metadata)
         self.map: GridMap = make_map(
             size, walls=walls, goals=goals, pits=pits,
             start=start, start_probabilities=start_probabilities, terminal_goal=terminal_goal,
@@ -121,9 +120,7 @@ class GridWorldEnv(TabularEnv):
     def render(self) -> Any:
         """The grid as text ("ansi") or as an (H, W, 3) uint8 picture ("rgb_array")."""
         if self.render_mode is None:
-            name = self.spec.id if self.spec else type(self).__name__
-            gym.logger.warn(f'render was called without a render mode: make it with gym.make("{name}", render_mode="ansi").')
-            return None
+            return warn_of_no_render_mode(self, "ansi")
         if self.render_mode == "ansi":
             return draw_text(self.map, self.s, self._came_from, self.last_action)
         if self._picture is None:

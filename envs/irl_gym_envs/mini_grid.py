@@ -33,6 +33,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.errors import InvalidInput, InvalidParameter, NotInstalled
 from irl_gym.seeded_starts import SeededStarts
+from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode
 
 PREFIX, SUFFIX = "MiniGrid-", "-v0"
 AGENT, COLOURS, STATES = 10, 6, 4
@@ -59,12 +60,12 @@ class MiniGridEnv(gym.Env):
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012 (as Gymnasium)
 
     def __init__(self, task: str = "Empty-5x5", layout: int | Sequence[int] = 0, render_mode: str | None = None):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidParameter(f"render_mode is {render_mode!r}: expected None or one of {self.metadata['render_modes']}.")
+        check_render_mode(render_mode, self.metadata)
         base = _mini_grid(task)
         # Nobody looks at its partial view, and most of a step's time goes into that: 80 us a step with it, 2 us without.
         base.gen_obs = dict
-        self.inner = SeededStarts(base, [layout] if isinstance(layout, numbers.Integral) else layout)  # type: ignore[list-item]
+        seeds: Any = [layout] if isinstance(layout, numbers.Integral) else layout
+        self.inner = SeededStarts(base, seeds)
         """MiniGrid's environment; `inner.unwrapped` has its grid, agent_pos, agent_dir and carrying."""
         self._base: Any = base
         self._things: dict[Hashable, int] = {}
@@ -114,11 +115,7 @@ class MiniGridEnv(gym.Env):
     def render(self) -> Any:
         """MiniGrid's picture: (H, W, 3) uint8 ("rgb_array"), or a window ("human")."""
         if self.render_mode is None:
-            name = self.spec.id if self.spec else type(self).__name__
-            gym.logger.warn(
-                f'render was called without a render mode: make it with gym.make("{name}", render_mode="rgb_array").'
-            )
-            return None
+            return warn_of_no_render_mode(self, "rgb_array")
         if self._kind is None:
             raise InvalidInput("render before the first episode: call reset first.")
         return self.inner.render()

@@ -15,6 +15,7 @@ from irl_gym.coordinates import Coordinates
 from irl_gym.errors import InvalidInput, InvalidParameter
 from irl_gym.physics import Moves
 from irl_gym_envs.physics_vector_env import PhysicsVectorEnv
+from irl_gym_envs.render_modes import check_render_mode
 
 LOW, HIGH = np.array([-1.2, -0.07]), np.array([0.5, 0.07])
 """Bounds of position and velocity."""
@@ -89,8 +90,7 @@ class MountainCarEnv(GymnasiumsMountainCarEnv):
     """
 
     def __init__(self, task: Literal["reach", "park"] = "reach", terminal_goal: bool = True, render_mode: str | None = None):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidParameter(f"render_mode is {render_mode!r}: expected None or one of {self.metadata['render_modes']}.")
+        check_render_mode(render_mode, self.metadata)
         self.physics = MountainCarPhysics(task, bool(terminal_goal))
         super().__init__(render_mode)
         self.max_position = float(HIGH[0])

@@ -6,6 +6,7 @@ two values part by part, and gives the dotted name of each part that differs; tw
 their parts alike.
 """
 
+import copy
 import enum
 import functools
 import io
@@ -23,6 +24,8 @@ Twin = Callable[[Any], Any | None]
 ATOMS = frozenset({int, float, bool, complex, str, bytes, type(None)})
 CODE = (type, types.FunctionType, types.ModuleType, np.ufunc)
 """Code is no state: functions, classes and modules are shared, as copy.deepcopy shares them."""
+REFUSALS = (TypeError, ValueError, AttributeError, RuntimeError, pickle.PicklingError, copy.Error)
+"""What an object raises that will not be copied, pickled or compared. Anything else on that way is a bug of its class."""
 SEQUENCES = (list, tuple, deque)
 ABSENT = object()
 
@@ -211,5 +214,5 @@ def shown(value: Any) -> str:
 def _equal(a: Any, b: Any) -> bool:
     try:
         return bool(a == b) or pickle.dumps(a) == pickle.dumps(b)
-    except Exception:  # no comparison and no pickle: nothing shows that they are alike
+    except REFUSALS:  # no comparison and no pickle: nothing shows that they are alike
         return False

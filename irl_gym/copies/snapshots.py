@@ -20,7 +20,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, Pairs, References, Twin, anew, attributes, slots
+from irl_gym.copies.calls import called, stepped
+from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, Pairs, References, Twin, anew, attributes, slots
 from irl_gym.copies.stripped import SHARED, awaken_generators, duplicate, layers, replace_generators
 from irl_gym.errors import InvalidParameter, NotEnumerable, NotTabular
 
@@ -52,14 +53,14 @@ class Snapshots:
         twin: maps a random generator to its driven stand-in, any other object to None.
 
     Raises:
-        NotTabular: an attribute cannot be copied, or the environment makes new generators while it runs.
+        NotTabular: an attribute cannot be copied, or the environment raises an error or makes new generators while it runs.
     """
 
     def __init__(self, env: gym.Env, twin: Twin):
         self._layers = layers(env)
         awaken_generators(env)
         rehearsal = duplicate(env)
-        self._own = env.unwrapped if rehearsal is None else None  # speaks for itself, by get_state and set_state
+        self._own: Any = env.unwrapped if rehearsal is None else None  # speaks for itself, by get_state and set_state
         unchanging = set() if rehearsal is None else _unchanging(rehearsal)
         self._stand_ins = replace_generators(env, twin)
         self._references = References(twin, (*CODE, gym.Space))
@@ -83,23 +84,23 @@ class Snapshots:
                 raise ConstantChanged(one.called)
         held = [place.read() for place in self._places]
         if self._own is not None:
-            held.append({"state": self._own.get_state()})  # type: ignore[attr-defined]
+            held.append({"state": called(self._own.get_state)})
         if not self._refuses_pickle:
             try:
                 return self._references.dumps(held)
             except (NotTabular, NotEnumerable):  # a uniform number that is kept is none to be copied
                 raise
-            except Exception:  # whatever a class raises that will not be pickled
+            except REFUSALS:
                 self._refuses_pickle = True
         return self._copied(held)
 
     def restore(self, state: Any) -> None:
         """Make the environment what it was when this state was taken."""
-        held = self._references.loads(state) if isinstance(state, bytes) else self._copied(state.held).held
+        held = called(lambda: self._references.loads(state)) if isinstance(state, bytes) else self._copied(state.held).held
         for place, values in zip(self._places, held, strict=False):
             place.write(values)
         if self._own is not None:
-            self._own.set_state(held[-1]["state"])  # type: ignore[attr-defined]
+            called(lambda: self._own.set_state(held[-1]["state"]))
 
     def same(self, a: Any, b: Any) -> bool:
         """The same inner state? Equal bytes are; else the contents decide: orders in a set, or shared strings, do not count."""
@@ -124,12 +125,12 @@ class Snapshots:
             InvalidParameter: a name that no layer holds.
         """
         known = {place.prefix + name: (place, name) for place in self._places for name in attributes(place.layer)}
-        for called in names:
-            if called not in known:
-                raise InvalidParameter(f"name={called!r} is no attribute: expected one of {', '.join(sorted(known))}.")
-            place, name = known[called]
+        for asked in names:
+            if asked not in known:
+                raise InvalidParameter(f"name={asked!r} is no attribute: expected one of {', '.join(sorted(known))}.")
+            place, name = known[asked]
             place.left_out.discard(name)
-            self._constants = [one for one in self._constants if one.called != called]
+            self._constants = [one for one in self._constants if one.called != asked]
         self._begin()
 
     def _begin(self) -> None:
@@ -146,8 +147,7 @@ class Snapshots:
 
     def _found(self, place: "_Place", unchanging: set[str]) -> Iterator["_Constant"]:
         for name, value in place.read().items():
-            called = place.prefix + name
-            if called in unchanging or not self._can_be_copied(value):
+            if place.prefix + name in unchanging or not self._can_be_copied(value):
                 yield _Constant(place, name, value, self._digest(value))
 
     def _can_be_copied(self, value: Any) -> bool:
@@ -155,7 +155,7 @@ class Snapshots:
             self._guard.dumps(value)
         except NotTabular:
             raise
-        except Exception:
+        except REFUSALS:
             try:
                 self._copied(value)
             except NotTabular:
@@ -165,14 +165,14 @@ class Snapshots:
     def _digest(self, value: Any) -> str | None:
         try:
             return hashlib.sha256(self._guard.dumps(value)).hexdigest()
-        except Exception:  # no pickle, no digest: such a constant is guarded by identity alone
+        except (*REFUSALS, NotTabular, NotEnumerable):  # no pickle, no digest: such a constant is guarded by identity alone
             return None
 
     def _copied(self, held: Any) -> "_Copy":
         memo = {id(one): one for one in self._references.objects}
         try:
             return _Copy(copy.deepcopy(held, memo))
-        except Exception as error:
+        except REFUSALS as error:
             if self._own is not None:
                 return _Copy(held)  # a handle of the environment's own, which only set_state understands
             raise NotTabular(
@@ -241,7 +241,7 @@ def _unchanging(rehearsal: gym.Env) -> set[str]:
     """The large attributes that resets and random steps leave alone, found on a copy that is thrown away.
 
     Raises:
-        NotTabular: a generator turns up that was not there after the reset with a seed.
+        NotTabular: it raises an error, or a generator turns up that was not there after the reset with a seed.
     """
     places = [_Place(layer) for layer in layers(rehearsal)]
     references = References(lambda _: None, (*CODE, gym.Space, *GENERATORS))
@@ -252,15 +252,15 @@ def _unchanging(rehearsal: gym.Env) -> set[str]:
         return {name: digest for place in places for name, digest in _large(place, references)}
 
     constants = large()
-    rehearsal.reset(seed=0)
+    called(lambda: rehearsal.reset(seed=0))
     rehearsal.action_space.seed(0)
     known = _generators(rehearsal)
     for step in range(REHEARSAL):
         if step % 50 == 0:
             constants = dict(constants.items() & large().items())
-        _, _, terminated, truncated, _ = rehearsal.step(rehearsal.action_space.sample())
+        _, _, terminated, truncated = stepped(rehearsal, rehearsal.action_space.sample())
         if terminated or truncated:
-            rehearsal.reset()
+            called(rehearsal.reset)
     new = [one for one in _generators(rehearsal) if not any(one is old for old in known)]
     if new:
         raise anew(new[0])
@@ -273,7 +273,7 @@ def _large(place: _Place, references: References) -> Iterator[tuple[str, tuple[i
             continue
         try:
             data = references.dumps(value)
-        except Exception:  # not large but strange: Snapshots tries such an attribute itself
+        except REFUSALS:  # not large but strange: Snapshots tries such an attribute itself
             continue
         if len(data) > LARGE:
             yield place.prefix + name, (id(value), hashlib.sha256(data).hexdigest())

@@ -102,10 +102,12 @@ def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
 def _whole(layer: gym.Env, memo: dict[int, Any]) -> Any:
     try:
         made = copy.deepcopy(layer, memo)
+    except MemoryError:
+        raise
     except Exception as error:
         raise NotTabular(
-            f"{type(layer).__name__} cannot be copied ({error}): expected an environment that copy.deepcopy copies. "
-            "Give it get_state() and set_state(state), or mend its __deepcopy__."
+            f"{type(layer).__name__} cannot be copied ({type(error).__name__}: {error}): expected an environment that "
+            "copy.deepcopy copies. Give it get_state() and set_state(state), or mend its __deepcopy__."
         ) from error
     if "render_mode" in vars(made):
         made.render_mode = None
@@ -119,14 +121,16 @@ def _copied_attribute(layer: gym.Env, name: str, value: Any, memo: dict[int, Any
         return None if name == "_cached_spec" else value
     try:
         return copy.deepcopy(value, memo)
+    except MemoryError:
+        raise
     except Exception as error:
         if _draws(value):
             return None
         where, culprit = _culprit(value, f"{type(layer).__name__}.{name}", layers(layer))
         raise NotTabular(
-            f"{where} is a {type(culprit).__name__}, which cannot be copied ({error}): expected an environment that "
-            f"copy.deepcopy copies. Give {type(layer.unwrapped).__name__} get_state() and set_state(state), or a "
-            "__deepcopy__ that leaves this attribute out."
+            f"{where} is a {type(culprit).__name__}, which cannot be copied ({type(error).__name__}: {error}): expected an "
+            f"environment that copy.deepcopy copies. Give {type(layer.unwrapped).__name__} get_state() and set_state(state), "
+            "or a __deepcopy__ that leaves this attribute out."
         ) from error
 
 
@@ -146,7 +150,9 @@ def _culprit(value: Any, where: str, known: list[Any]) -> tuple[str, Any]:
     for name, part in parts:
         try:
             copy.deepcopy(part, {id(one): one for one in known})
-        except Exception:
+        except MemoryError:
+            raise
+        except Exception:  # whatever it was that the whole raised
             return _culprit(part, name, [*known, value])
     return where, value
 

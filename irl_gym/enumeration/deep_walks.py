@@ -84,21 +84,19 @@ def _steps(explorer: "Explorer", seed: list[int], keep: int | None) -> Iterator[
     """A walk from a reset to its end, or to an observation that the table does not begin with."""
     explored, trials = explorer.explored, explorer.trials
     rng = np.random.default_rng(seed)
-    trials.snapshots.restore(trials.fresh)
-    number, way = explored.ids.get(explorer.key(trials.env.reset()[0])), []
+    number, way = explored.ids.get(explorer.key(trials.reset()()[0])), []
     careful = seed[1] % 2 == 1
     while number is not None:
         lines = explored.lines_of(number)
         safe = sorted(set(range(explorer.n_actions)) - {line[0] for line in lines if line[1] < 0}) if careful else []
         action = int(rng.choice(safe)) if safe else int(rng.integers(explorer.n_actions))
         inner = trials.snapshots.take() if keep == len(way) else None
-        observation, reward, ended, truncated, _ = trials.env.step(action + trials.first_action)
-        trials.truncated += bool(truncated)
+        observation, reward, ended, truncated = trials.move(action)
         key = explorer.key(observation)
         known = explored.ends.get(key) if ended else explored.ids.get(key)
         successor = None if known is None else -1 - known if ended else known
         sure = number >= explorer.known_from and number * explorer.n_actions + action not in explorer.counted_rows
-        possible = not sure or any(_is(line, action, successor, float(reward)) for line in lines)
+        possible = not sure or any(_is(line, action, successor, reward) for line in lines)
         yield Step(number, list(way) if not possible else way, possible, inner)
         way.append(action)
         number = None if ended or truncated else known

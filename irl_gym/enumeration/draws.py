@@ -87,7 +87,7 @@ class Draws:
         """One run along a path. What a run returns that is cut short does not matter."""
         before, real = self._path, self._real
         self._path, self._real = path, None
-        result = None
+        result: Any = None
         try:
             path.begin()
             result = run()
@@ -100,7 +100,7 @@ class Draws:
         finally:
             path.number, self._path, self._real = 0, before, real
         path.end()
-        return result  # pyright: ignore[reportReturnType]
+        return result
 
     def answerer(self, base: type, method: str) -> tuple[Any, Path | None]:
         """Who answers a draw: a real generator, in a seeded run, or the path.
@@ -220,4 +220,4 @@ for _base, _cls in _STAND_INS.items():
     for _name in dir(_base):
         if not _name.startswith("_") and callable(getattr(_base, _name)):
             setattr(_cls, _name, _driven(_base, _name))
-DrivenGenerator.bit_generator = property(_driven(np.random.Generator, "bit_generator"))  # pyright: ignore
+DrivenGenerator.bit_generator = property(_driven(np.random.Generator, "bit_generator"))  # pyright: ignore[reportAttributeAccessIssue]

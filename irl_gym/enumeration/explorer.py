@@ -53,7 +53,6 @@ class Explorer:
         self.space = env.observation_space
         self._key_of = key_of(self.space)
         self.trials = Trials(env, limits, always, counting)
-        self.compared = 0
         self._waiting: dict[int, Any] = {}
         self._marks: dict[int, tuple[int, ...]] = {}
         self._arrivals: dict[int, int] = {}
@@ -165,7 +164,7 @@ class Explorer:
         """What an observation is known by."""
         try:
             return self._key_of(observation)
-        except IrlGymError:
+        except (IrlGymError, MemoryError):
             raise
         except Exception as error:  # whatever an observation of another kind brings about
             raise UnknownObservation(
@@ -205,7 +204,6 @@ class Explorer:
         if not self.tell_apart(number, newcomer, lambda: self._actions(way), reached):
             self.explored.counted["uncompared"] += 1
             return
-        self.compared += 1
         for after, taken, state in reached:
             self._doubt(after, state, (way, taken))
 

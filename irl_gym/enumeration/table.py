@@ -19,12 +19,13 @@ import gymnasium as gym
 import numpy as np
 
 from irl_gym.checks import checked_number
+from irl_gym.copies.calls import called
 from irl_gym.copies.snapshots import ConstantChanged
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.trials import OutsideRandomness, called
+from irl_gym.enumeration.trials import OutsideRandomness
 from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
@@ -80,10 +81,10 @@ class Enumeration(Limits):
             RunConflict: a checkpoint of something else.
         """
         ranges(env.observation_space)  # refuses floats before anything is copied
-        explored, compared = self._explore(env, progress or (lambda tried, found: None))
-        return _assembled(explored, env, gamma, compared)
+        explored = self._explore(env, progress or (lambda tried, found: None))
+        return _assembled(explored, env, gamma, looked=self.revisits > 0)
 
-    def _explore(self, env: gym.Env, on_states: OnStates) -> tuple[Explored, int]:
+    def _explore(self, env: gym.Env, on_states: OnStates) -> Explored:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
         always: frozenset[str] = frozenset()
         counting = False
@@ -104,7 +105,7 @@ class Enumeration(Limits):
                 explorer.explored.always = tuple(sorted(always))
                 explorer.explored.settle()
                 self._run(explorer, env, on_states)
-                return explorer.explored, explorer.compared
+                return explorer.explored
             except ConstantChanged as error:
                 always |= frozenset({error.name})
                 self._forget()
@@ -183,7 +184,7 @@ def _mend(env: gym.Env) -> str:
     )
 
 
-def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int) -> Tabulation:
+def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) -> Tabulation:
     """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
     space = env.observation_space
     only_ends = [key for key in explored.ends if key not in explored.ids]
@@ -208,14 +209,15 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, compared: int) ->
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, compared, len(copies)))
+    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, len(copies), looked))
 
 
-def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
+def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
+    """How the table was obtained, in words that are the same where the search was interrupted and continued."""
     counted = explored.counted["rows"]
     method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
     if not counted:
-        method += f", with every outcome of its draws; {compared:,} states were met in other inner states and did the same."
+        method += f", with every outcome of its draws.{'' if looked else ' Hidden state was not looked for.'}"
         method += _left_out(explored)
         return Evidence(method, exact=True, merged=0, split=split, check=None)
     mean_runs = explored.counted["runs"] / counted
@@ -233,7 +235,6 @@ def _evidence(explored: Explored, compared: int, split: int) -> Evidence:
 
 def _left_out(explored: Explored) -> str:
     """What the environment did that a table cannot hold."""
-    truncated = explored.counted["truncated"]
-    if not truncated:
+    if not explored.counted["truncated"]:
         return ""
-    return f" The environment truncated {truncated:,} step(s) itself; truncation is not part of a table."
+    return " The environment truncated steps itself; truncation is not part of a table."

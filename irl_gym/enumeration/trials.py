@@ -14,11 +14,12 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.snapshots import ConstantChanged, Snapshots
+from irl_gym.copies.calls import called, stepped
+from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.draws import Draws
 from irl_gym.enumeration.explored import Script
 from irl_gym.enumeration.limits import Limits
-from irl_gym.errors import IrlGymError, NotEnumerable, NotTabular
+from irl_gym.errors import NotEnumerable
 
 REPLAYED = 50
 """Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
@@ -78,7 +79,7 @@ class Trials:
         self.env, self.limits, self.counting = env, limits, counting
         self.first_action = int(space.start)
         self.draws = Draws(limits.most_outcomes)
-        self.snapshots = called(lambda: Snapshots(env, self.draws.twin))  # which walks about in it
+        self.snapshots = Snapshots(env, self.draws.twin)
         self.snapshots.include(always)
         self.fresh = self.snapshots.take()
         self.refusals = 0
@@ -94,7 +95,7 @@ class Trials:
 
         def run() -> Result:
             self.snapshots.restore(self.fresh)
-            return self.env.reset()[0], 0.0, False
+            return called(self.env.reset)[0], 0.0, False
 
         return run
 
@@ -103,11 +104,16 @@ class Trials:
 
         def run() -> Result:
             self.snapshots.restore(state)
-            observation, reward, terminated, truncated, _ = self.env.step(action + self.first_action)
-            self.truncated += bool(truncated)
-            return observation, float(reward), bool(terminated)
+            observation, reward, terminated, _ = self.move(action)
+            return observation, reward, terminated
 
         return run
+
+    def move(self, action: int) -> tuple[Any, float, bool, bool]:
+        """A step from where the environment is: observation, reward, terminated, truncated; actions count from 0."""
+        moved = stepped(self.env, action + self.first_action)
+        self.truncated += moved[3]
+        return moved
 
     def outcomes(self, call: Call, row: int, make: Callable[[Result], Any], *, runs: int) -> Outcomes:
         """Every outcome of a call; `make` is called while the environment is in it.
@@ -159,22 +165,21 @@ class Trials:
     def again(self, call: Call, row: int, script: Script) -> Result:
         """The outcome of a script."""
         if script[:1] != (-1,):
-            return called(lambda: self.draws.replay(script, call))
+            return self.draws.replay(script, call)
         seed = [self.limits.seed, row + 1, script[1]]
         if not self.counting:
-            return called(lambda: self.draws.seeded(seed, call))
+            return self.draws.seeded(seed, call)
         return self.seeded(seed, call)
 
     def seeded(self, seed: list[int], run: Callable[[], T]) -> T:
         """Run with real random numbers, also of the generators that NumPy and Python share."""
         with _seeded_globals(seed):
-            return called(lambda: self.draws.seeded(seed, run))
+            return self.draws.seeded(seed, run)
 
     def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
         """All outcomes; None for a random call after others had too many."""
-        found, outcomes = [], self.draws.outcomes(call)
-        while (one := called(lambda: next(outcomes, None))) is not None:
-            probability, script, result = one
+        found = []
+        for probability, script, result in self.draws.outcomes(call):
             found.append(Outcome(probability, script, result, make(result)))
             if len(found) % PULSE == 0:
                 self.pulse()
@@ -188,23 +193,6 @@ class Trials:
             observation, reward, terminated = self.again(call, 0, last.script)
             if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
                 raise OutsideRandomness
-
-
-def called(run: Callable[[], Any]) -> Any:
-    """What a call of the environment returns.
-
-    Raises:
-        NotTabular: it raised an error of its own.
-    """
-    try:
-        return run()
-    except (IrlGymError, ConstantChanged):
-        raise
-    except Exception as error:
-        raise NotTabular(
-            f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, to "
-            "work. Mend the environment."
-        ) from error
 
 
 def _same(a: Any, b: Any) -> bool:

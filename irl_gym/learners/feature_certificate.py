@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
-from irl_gym.certificate import OPTIMAL_WITHIN, plain
+from irl_gym.certificate import OPTIMAL_WITHIN, Proven
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
 
 
 @dataclass(frozen=True, eq=False)
-class FeatureCertificate:
+class FeatureCertificate(Proven):
     """What a reward alpha . phi proves."""
 
     expert_optimal: bool
@@ -59,11 +59,6 @@ class FeatureCertificate:
     """The largest standard error of a row of (10) under R; None where the rows are exact or had one rollout."""
 
     @property
-    def duality_gap(self) -> float:
-        """dual_bound - objective: how far alpha can be from the optimum."""
-        return self.dual_bound - self.objective
-
-    @property
     def degenerate(self) -> bool:
         """Is R zero or constant?"""
         return self.zero or self.constant
@@ -75,7 +70,7 @@ class FeatureCertificate:
         lines = [
             f"expert optimal under R   {'yes' if self.expert_optimal else no}",
             f"margins                  {finite.min():.3g} to {finite.max():.3g} in {finite.size} states",
-            f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
+            self.optimality,
             f"sample                   {self.states} states; {self.trivial} more have no other successors to compare",
             f"features                 {self.n_features}; the rows have rank {self.rank}",
         ]
@@ -86,10 +81,6 @@ class FeatureCertificate:
         if self.standard_error is not None:
             lines.append(f"standard error           {self.standard_error:.2e} at most, of a row under R")
         return "\n".join(lines)
-
-    def to_json(self) -> dict[str, Any]:
-        """The certificate as json holds it: NaN becomes None."""
-        return plain(self, "duality_gap", "degenerate")
 
 
 @dataclass(frozen=True, eq=False)

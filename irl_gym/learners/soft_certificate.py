@@ -8,12 +8,11 @@ Axes: S states, A actions, n rows of (4).
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from irl_gym._typing import Vector
-from irl_gym.certificate import Certificate, least_per_state, tolerated, violated_rows
+from irl_gym.certificate import Certificate, comparable, judged, least_per_state
 from irl_gym.dynamic_programming import backup, policy_iteration
 from irl_gym.learners.soft import PartlyKnown
 from irl_gym.mdp import TabularMDP
@@ -69,14 +68,14 @@ def _spread(partly: PartlyKnown, R: TabularReward) -> Vector:
     return np.where(partly.unknown, mdp.gamma * (following.max(axis=1) - following.mean(axis=1)), 0.0)
 
 
-def objective(partly: PartlyKnown, judged: Judged, terms: Terms) -> float:
+def objective(partly: PartlyKnown, found: Judged, terms: Terms) -> float:
     """sum_s w_s (min(margin+, cap) - C violation) - l1 N, at the reward."""
     S, c = partly.mdp.n_states, partly.comparisons
-    counted = least_per_state(judged.margins[terms.counted], c.states[terms.counted], S)
-    least = least_per_state(judged.margins[partly.active], c.states[partly.active], S)
+    counted = least_per_state(found.margins[terms.counted], c.states[terms.counted], S)
+    least = least_per_state(found.margins[partly.active], c.states[partly.active], S)
     gains = np.clip(np.where(np.isnan(counted), 0.0, counted), 0.0, np.inf if terms.cap is None else terms.cap)
     short = np.maximum(-np.where(np.isnan(least), 0.0, least), 0.0) * (terms.slack or 0.0)
-    return float(partly.weights @ (gains - short)) - terms.l1 * judged.price
+    return float(partly.weights @ (gains - short)) - terms.l1 * found.price
 
 
 def certify_partly(
@@ -104,34 +103,19 @@ def certify_partly(
     """
     part, c = partly.mdp, partly.comparisons
     R = TabularReward(reward.values[rows])
-    judged = judge(partly, R, terms.r_max)
-    comparable = ~c.equal & (~c.trivial | (not R.on_states))
-    least = least_per_state(judged.margins[comparable], c.states[comparable], part.n_states)
-    rounding = tolerated(R, mdp.gamma)
-    short = np.where(partly.active, np.maximum(-judged.margins, 0.0), 0.0)
-    worst = float(short.max(initial=0.0))
-    margin = np.full(mdp.n_states, np.nan)
-    margin[rows] = least
-    paid = R.values if R.on_states else R.values[~part.terminal]
-    tied = c.states[c.trivial & ~c.equal & R.on_states]
-    proof: dict[str, Any] = violated_rows(short, rounding, c, rows, visits)
+    found = judge(partly, R, terms.r_max)
+    usable = comparable(c, R)
+    least = least_per_state(found.margins[usable], c.states[usable], part.n_states)
+    short = np.where(partly.active, np.maximum(-found.margins, 0.0), 0.0)
     return Certificate(
-        expert_optimal=bool(worst <= rounding),
-        worst_violation=worst,
-        margin=margin,
-        objective=objective(partly, judged, terms),
+        objective=objective(partly, found, terms),
         dual_bound=bound,
         l1=float(terms.l1),
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if terms.cap is None else float(terms.cap),
-        l1_norm=float(np.abs(R.values).sum()),
         least_l1_norm=float("nan"),
-        constant=bool(np.ptp(paid) <= 1e-9 * terms.r_max) if paid.size else True,
-        zero=bool(np.abs(paid).max(initial=0.0) <= 1e-9 * terms.r_max),
         unconstrained=rows[np.isnan(least) & partly.known],
-        inseparable=rows[np.unique(tied)],
-        marginless=rows[least <= rounding],
         slack=None if terms.slack is None else float(terms.slack),
         unknown=rows[partly.unknown],
-        **proof,
+        **judged(mdp, part, rows, c, R, least, short, terms.r_max, visits),
     )

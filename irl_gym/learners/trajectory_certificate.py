@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.certificate import plain
+from irl_gym.certificate import Proven, plain
 
 
 @dataclass(frozen=True, eq=False)
-class TrajectoryCertificate:
+class TrajectoryCertificate(Proven):
     """What a reward alpha . phi proves about the expert and the policies found."""
 
     gaps: np.ndarray
@@ -61,11 +61,6 @@ class TrajectoryCertificate:
         return self.regret < -2 * self.regret_error - 1e-9
 
     @property
-    def duality_gap(self) -> float:
-        """dual_bound - objective: how far alpha can be from the optimum."""
-        return self.dual_bound - self.objective
-
-    @property
     def degenerate(self) -> bool:
         """Is R zero, or does it tie the expert with all policies found before?"""
         return self.zero or bool((np.abs(self.gaps) <= 2 * self.gap_errors).all())
@@ -80,7 +75,7 @@ class TrajectoryCertificate:
             f"value gaps               {self.gaps.min():.4g} to {self.gaps.max():.4g}, {noise}",
             f"planned policy's gain    {self.regret:.4g} under R, standard error {self.regret_error:.2g}{short}",
             f"distance to the expert   {self.distance:.4g} in the features; noise alone makes about {self.distance_error:.2g}",
-            f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum",
+            self.optimality,
             f"features                 {self.n_features}; the rows have rank {self.rank}",
             f"trajectories             cut after {self.horizon} steps, which costs a value {self.truncation:.2g} at most",
         ]

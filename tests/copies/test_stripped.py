@@ -79,3 +79,38 @@ def test_take_refuses_a_generator_that_is_nobodys_stand_in():
     env.parts = [np.random.default_rng(0)]
     with pytest.raises(NotTabular, match="made a new Generator"):
         snapshots.take()
+
+
+class Uncopied:
+    """Raises what it is given when it is copied."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def __deepcopy__(self, memo):
+        raise self.error
+
+
+def test_without_watchers_names_what_a_copy_raised():
+    error = KeyError("part")
+    with pytest.raises(NotTabular, match=r"Walk.inner is a Uncopied, which cannot be copied \(KeyError: 'part'\)") as told:
+        without_watchers(Walk(inner=Uncopied(error)))
+    assert told.value.__cause__ is error
+
+
+@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt()])
+def test_without_watchers_lets_pass_what_says_nothing_about_the_environment(error):
+    with pytest.raises(type(error)) as passed:
+        without_watchers(Walk(inner=Uncopied(error)))
+    assert passed.value is error
+
+
+@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt()])
+def test_a_lack_of_memory_in_a_copy_of_the_whole_passes(error):
+    class Whole(Walk):
+        def __deepcopy__(self, memo):
+            raise error
+
+    with pytest.raises(type(error)) as passed:
+        without_watchers(Whole())
+    assert passed.value is error

@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from irl_gym.enumeration import deep_walks
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import HiddenState, NotTabular
+from irl_gym.errors import HiddenState
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 
@@ -94,9 +94,15 @@ def test_the_same_walk_is_made_again():
 
 
 def test_no_walk_is_made_where_every_inner_state_was_compared(monkeypatch):
-    monkeypatch.setattr(deep_walks, "_steps", None)
+    class Walked(Exception):
+        pass
+
+    def steps(*_):
+        raise Walked
+
+    monkeypatch.setattr(deep_walks, "_steps", steps)
     assert table_of(Corridor()).evidence.exact
-    with pytest.raises(NotTabular, match="'NoneType' object is not callable"):
+    with pytest.raises(Walked):
         table_of(Clock(100))
 
 
@@ -106,7 +112,7 @@ def test_no_walk_is_made_where_the_observation_is_trusted():
 
 def test_what_comes_after_a_truncation_is_left_alone():
     evidence = table_of(Truncated(200)).evidence
-    assert evidence.exact and re.search(r"truncated \d+ step\(s\) itself", evidence.method)
+    assert evidence.exact and "truncated steps itself" in evidence.method
 
 
 class Ages(Corridor):

@@ -183,7 +183,9 @@ class OwnGenerator(np.random.Generator):
     """Somebody's, whose methods may be anything."""
 
 
-@pytest.mark.parametrize("other", [None, 3, np.random, OwnGenerator(np.random.PCG64())], ids=["None", "3", "module", "subclass"])
+@pytest.mark.parametrize(
+    "other", [None, 3, np.random, OwnGenerator(np.random.PCG64())], ids=["None", "3", "module", "subclass"]
+)
 def test_what_is_no_known_generator_has_no_twin(draws, other):
     assert draws.twin(other) is None
 

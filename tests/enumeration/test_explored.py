@@ -84,6 +84,21 @@ def test_a_search_that_was_stopped_goes_on_to_the_same_table(tmp_path, name, sta
     assert same_table(table_of(make(), checkpoint=path), table_of(make()))
 
 
+def test_the_evidence_is_the_same_when_a_search_was_stopped_and_goes_on(tmp_path):
+    class Ages(Corridor):
+        """Counts its steps, harmlessly, so that states are met in other inner states."""
+
+        age = 0
+
+        def step(self, action):
+            self.age += 1
+            return self.moved(int(action))
+
+    path = tmp_path / "search.npz"
+    stopped(Ages(), path, 4)
+    assert table_of(Ages(), checkpoint=path).evidence == table_of(Ages()).evidence
+
+
 def test_a_search_with_draws_at_its_start_goes_on_to_the_same_table(tmp_path):
     make = ENVIRONMENTS["fickle Taxi"]
     path = stopped(make(), tmp_path / "search.npz", 700, revisits=0)

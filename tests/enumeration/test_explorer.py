@@ -8,6 +8,7 @@ import pytest
 from enumeration_envs import Board, Corridor
 from gymnasium import spaces
 
+from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import IrlGymError, NotDiscrete, NotTabular, UnknownObservation
 from irl_gym.seeded_starts import SeededStarts
@@ -221,3 +222,15 @@ def test_progress_is_told_to_the_end():
     told = []
     Enumeration().table(Board(4), 0.9, lambda tried, found: told.append((tried, found)))
     assert told[-1] == (15, 15)  # the sixteenth cell is the end
+
+
+def test_a_lack_of_memory_is_no_unknown_observation(monkeypatch):
+    def key_of(observation):
+        raise MemoryError
+
+    env = Corridor()
+    env.reset(seed=0)
+    explorer = Explorer(env, Enumeration(), None, frozenset(), False)
+    monkeypatch.setattr(explorer, "_key_of", key_of)
+    with pytest.raises(MemoryError):
+        explorer.key(0)

@@ -8,6 +8,7 @@ import pytest
 from enumeration_envs import Corridor
 from gymnasium import spaces
 
+from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import HiddenState
 from irl_gym.reveal import Reveal
@@ -142,13 +143,31 @@ def test_what_never_matters_is_no_hidden_state():
     assert table.evidence.exact and table.mdp.n_states == 7 and not table.evidence.method.startswith("0 states")
 
 
-def test_what_was_compared_is_told():
-    compared = int(re.search(r"(\d+) states were met in other inner states", table_of(Harmless()).evidence.method)[1])
-    assert compared >= 6  # each cell but the last, at least once
+@pytest.fixture
+def compared(monkeypatch):
+    """The states that are tried in another inner state."""
+    numbers, tell_apart = [], Explorer.tell_apart
+
+    def counting(self, number, *args):
+        numbers.append(number)
+        return tell_apart(self, number, *args)
+
+    monkeypatch.setattr(Explorer, "tell_apart", counting)
+    return numbers
 
 
-def test_nothing_is_compared_when_the_observation_is_trusted():
-    assert "; 0 states were met" in table_of(Flag(), revisits=0).evidence.method
+def test_each_state_is_compared_in_another_inner_state(compared):
+    table_of(Harmless())
+    assert set(compared) >= set(range(6))  # each cell but the last
+
+
+def test_nothing_is_compared_when_the_observation_is_trusted(compared):
+    method = table_of(Flag(), revisits=0).evidence.method
+    assert not compared and method.endswith("Hidden state was not looked for.")
+
+
+def test_the_evidence_does_not_tell_of_not_looking_when_hidden_state_was_looked_for():
+    assert "not looked for" not in table_of(Harmless()).evidence.method
 
 
 class Rows(Corridor):

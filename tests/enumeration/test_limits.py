@@ -124,14 +124,14 @@ class Dice(Board):
 @pytest.mark.parametrize("at", ["reset", "step"])
 def test_the_clock_is_looked_at_and_told_within_a_call_of_many_outcomes(at):
     told = []
-    with pytest.raises(EnumerationLimit, match=r"after 0 s.*max_seconds=0\.1"):
+    with pytest.raises(EnumerationLimit, match=r"after \d s.*max_seconds=0\.1"):
         Enumeration(max_seconds=0.1).table(Dice(at), 0.9, lambda *counts: told.append(counts))
     assert told
 
 
 @pytest.mark.parametrize("runs", [{"runs": 10_000}, {"start_runs": 10_000}])
 def test_the_clock_is_looked_at_within_a_call_that_is_counted(runs):
-    with pytest.raises(EnumerationLimit, match=r"after 0 s.*max_seconds=0\.1"):
+    with pytest.raises(EnumerationLimit, match=r"after \d s.*max_seconds=0\.1"):
         at = "step" if "runs" in runs else "reset"
         Enumeration(max_seconds=0.1, most_outcomes=10, **runs).table(Dice(at), 0.9)
 

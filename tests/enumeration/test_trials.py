@@ -239,8 +239,8 @@ class Truncates(Corridor):
 
 
 def test_a_truncation_of_the_environments_own_is_told():
-    method = table_of(Truncates()).evidence.method  # from cells 0 and 1 to the left
-    assert "The environment truncated 2 step(s) itself; truncation is not part of a table." in method
+    method = table_of(Truncates()).evidence.method
+    assert "The environment truncated steps itself; truncation is not part of a table." in method
     assert "truncat" not in table_of(Corridor()).evidence.method
 
 

@@ -1,0 +1,46 @@
+"""Calls of somebody else's environment: what it raises is told as its own.
+
+A search steps an environment where its author never did, and meets errors that nobody has seen. Such an error is named in the
+message and stays its cause, so that its own traceback is shown too. What passes as it is: errors of this library (a draw that
+cannot be enumerated is one), and a lack of memory, which is no fault of the environment's.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import gymnasium as gym
+
+from irl_gym.errors import IrlGymError, NotTabular
+
+T = TypeVar("T")
+
+
+def called(run: Callable[[], T]) -> T:
+    """What a call of an environment returns; `run` is to hold no more than that call.
+
+    Raises:
+        NotTabular: it raised an error of its own.
+    """
+    try:
+        return run()
+    except (IrlGymError, MemoryError):
+        raise
+    except Exception as error:
+        raise NotTabular(
+            f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, to "
+            "work. Mend the environment."
+        ) from error
+
+
+def stepped(env: gym.Env, action: Any) -> tuple[Any, float, bool, bool]:
+    """One step of an environment: observation, reward, terminated, truncated.
+
+    Raises:
+        NotTabular: it raised an error, or did not return five values.
+    """
+    return called(lambda: _step(env, action))
+
+
+def _step(env: gym.Env, action: Any) -> tuple[Any, float, bool, bool]:
+    observation, reward, terminated, truncated, _ = env.step(action)
+    return observation, float(reward), bool(terminated), bool(truncated)

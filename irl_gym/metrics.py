@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix, Vector
+from irl_gym.checks import checked_number
 from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration, tied
-from irl_gym.errors import InvalidParameter
-from irl_gym.intervals import mean_interval  # noqa: F401
+from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
@@ -46,6 +46,17 @@ class Regret:
     """The optimal value from d0."""
 
 
+def checked_mdp(mdp: Any) -> TabularMDP:
+    """Return a TabularMDP as it is.
+
+    Raises:
+        InvalidMDP: anything else, such as an environment or a whole Tabulation.
+    """
+    if isinstance(mdp, TabularMDP):
+        return mdp
+    raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
+
+
 def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any, horizon: int | None = None) -> float:
     """Exact discounted value of a policy from d0: d0 . (I - gamma P_pi)^-1 R_pi.
 
@@ -54,13 +65,18 @@ def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: An
         reward: (S,) paid on arrival, or (S, A).
         policy: (S,) actions, (S, A) probabilities or set.
         horizon: count only this many steps; None for all.
+
+    Raises:
+        InvalidMDP, InvalidReward, InvalidPolicy: no table, or a reward or policy of another.
+        InvalidParameter: a horizon that is not a whole number of at least 0.
     """
     if horizon is None:
-        return float(mdp.d0 @ evaluate_policy(mdp, as_reward(reward), policy))
-    mixing = mdp.mixing(policy)
+        return float(checked_mdp(mdp).d0 @ evaluate_policy(mdp, as_reward(reward), policy))
+    steps = int(checked_number("horizon", horizon, "a whole number of steps of at least 0, or None", least=0, whole=True))
+    mixing = checked_mdp(mdp).mixing(policy)
     P_pi, R_pi = mixing @ mdp.P, mixing @ as_reward(reward).expected(mdp).ravel()
     at, value = mdp.d0, 0.0
-    for time in range(horizon):
+    for time in range(steps):
         value += mdp.gamma**time * float(at @ R_pi)
         at = at @ P_pi
     return value
@@ -68,14 +84,20 @@ def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: An
 
 def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:
     """Exact discounted value of uniformly random actions from d0."""
-    uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
+    uniform = np.full((checked_mdp(mdp).n_states, mdp.n_actions), 1 / mdp.n_actions)
     return policy_value(mdp, reward, uniform)
 
 
 def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE) -> ActionSets:
-    """(S, A) the actions that are optimal, to a tolerance in units of max |R|."""
+    """(S, A) the actions that are optimal, to a tolerance in units of max |R|.
+
+    Raises:
+        InvalidMDP, InvalidReward: no table, or a reward of another.
+        InvalidParameter: a negative tolerance.
+    """
+    tolerance = checked_number("tolerance", tolerance, "a share of max |R| of at least 0, such as 1e-6", least=0)
     reward = as_reward(reward)
-    return tied(policy_iteration(mdp, reward).Q, tolerance * float(np.abs(reward.values).max()))
+    return tied(policy_iteration(checked_mdp(mdp), reward).Q, tolerance * float(np.abs(reward.values).max()))
 
 
 def worst_tie(
@@ -105,7 +127,7 @@ def regret(mdp: TabularMDP, true: TabularReward | np.ndarray, policy: Any) -> Re
         policy: (S,) actions, (S, A) probabilities or set.
     """
     true = as_reward(true)
-    best = policy_iteration(mdp, true).V
+    best = policy_iteration(checked_mdp(mdp), true).V
     lost = np.maximum(best - evaluate_policy(mdp, true, policy), 0.0)  # below 0 by rounding only
     return Regret(float(mdp.d0 @ lost), lost, float(mdp.d0 @ best))
 
@@ -132,7 +154,7 @@ def expected_value_difference(
         tolerance: what counts as tied; see `optimal_actions`.
     """
     true = as_reward(true)
-    value = float(mdp.d0 @ policy_iteration(mdp, true).V) if expert is None else policy_value(mdp, true, expert)
+    value = float(checked_mdp(mdp).d0 @ policy_iteration(mdp, true).V) if expert is None else policy_value(mdp, true, expert)
     return value - policy_value(mdp, true, optimal_actions(mdp, learned, tolerance=tolerance))
 
 
@@ -144,11 +166,21 @@ def normalised_score(value: float, random: float, expert: float) -> float:
 def agreement(mdp: TabularMDP, policy: Any, good: ActionSets) -> float:
     """Share of the reachable, non-terminal states in which a policy takes an action of the set `good` (S, A).
 
-    A stochastic policy counts with the probability it gives to the set.
+    A stochastic policy counts with the probability it gives to the set. NaN where every start is terminal.
+
+    Raises:
+        InvalidMDP, InvalidPolicy: no table, or a policy of another.
+        InvalidParameter: `good` of another shape, or of something else than booleans.
     """
-    acting = mdp.reachable & ~mdp.terminal
+    acting = checked_mdp(mdp).reachable & ~mdp.terminal
     probabilities: Matrix = as_distribution(policy, mdp.n_states, mdp.n_actions)
-    return float((probabilities * good).sum(axis=1)[acting].mean())
+    chosen = np.asarray(good)
+    if chosen.shape != probabilities.shape or chosen.dtype != bool:
+        raise InvalidParameter(
+            f"good has shape {chosen.shape} and dtype {chosen.dtype}: expected {probabilities.shape} booleans, such as "
+            "`optimal_actions(mdp, reward)`."
+        )
+    return float((probabilities * chosen).sum(axis=1)[acting].mean()) if acting.any() else float("nan")
 
 
 def tie_aware_agreement(
@@ -180,7 +212,7 @@ def occupancy_distance(
     """
     if on not in ("state", "state-action"):
         raise InvalidParameter(f"on is {on!r}: expected 'state' or 'state-action'.")
-    visits = [occupancy(mdp, policy) for policy in (first, second)]
+    visits = [occupancy(checked_mdp(mdp), policy) for policy in (first, second)]
     if on == "state":
         visits = [mu.sum(axis=1) for mu in visits]
     one, other = (mu / max(mu.sum(), TINY) for mu in visits)

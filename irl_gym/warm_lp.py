@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import Sparse
-from irl_gym.errors import SolverFailed, SolverInfeasible, SolverTimeout
+from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
 TOLERANCE = 1e-9
 """Of primal and dual feasibility, absolute."""
@@ -47,6 +47,11 @@ class WarmLP:
         least: (n,) least values of the variables.
         most: (n,) largest values of the variables.
         time_limit: seconds for each solve; None for no limit.
+        perturbed: HiGHS may shift costs and bounds a little on its way, which gets it anywhere; what is left of the shifts can
+            make an answer slightly worse.
+
+    Raises:
+        InvalidParameter: bounds of another length than A, or NaN.
     """
 
     def __init__(
@@ -58,14 +63,15 @@ class WarmLP:
         most: np.ndarray,
         *,
         time_limit: float | None = None,
+        perturbed: bool = True,
     ):
         rows, columns = A.shape
         by_column = sp.csc_array(A)
         lp: Any = highspy.HighsLp()
         lp.num_col_, lp.num_row_ = columns, rows
         lp.col_cost_ = np.zeros(columns)
-        lp.col_lower_, lp.col_upper_ = _bounds(least, columns), _bounds(most, columns)
-        lp.row_lower_, lp.row_upper_ = _bounds(low, rows), _bounds(high, rows)
+        lp.col_lower_, lp.col_upper_ = _bounds("least", least, columns), _bounds("most", most, columns)
+        lp.row_lower_, lp.row_upper_ = _bounds("low", low, rows), _bounds("high", high, rows)
         lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
         lp.a_matrix_.start_, lp.a_matrix_.index_ = by_column.indptr, by_column.indices
         lp.a_matrix_.value_ = by_column.data
@@ -76,6 +82,8 @@ class WarmLP:
             "output_flag": False, "threads": 1, "presolve": "off", "solver": "simplex", "simplex_strategy": PRIMAL_SIMPLEX,
             "primal_feasibility_tolerance": TOLERANCE, "dual_feasibility_tolerance": TOLERANCE,
         }  # fmt: skip
+        if not perturbed:
+            options |= {f"{kind}_perturbation_multiplier": 0.0 for kind in ("primal_simplex_bound", "dual_simplex_cost")}
         for name, value in options.items():
             self.highs.setOptionValue(name, value)
         self.highs.passModel(lp)
@@ -87,15 +95,21 @@ class WarmLP:
             cost: (n,) c.
 
         Raises:
+            InvalidParameter: a cost of another length, or not finite.
             SolverInfeasible: the constraints contradict each other.
             SolverTimeout: the time limit was reached.
             SolverFailed: unbounded, or no answer.
         """
         cost = np.ascontiguousarray(cost, dtype=np.float64)
+        if cost.shape != self.columns.shape or not np.isfinite(cost).all():
+            raise InvalidParameter(f"cost has shape {cost.shape}: expected {self.columns.size} finite numbers, one a variable.")
         self.highs.changeColsCost(cost.size, self.columns, cost)
         if self.time_limit is not None:
             self.highs.setOptionValue("time_limit", self.highs.getRunTime() + self.time_limit)
         self.highs.run()
+        if self.highs.getModelStatus() == highspy.HighsModelStatus.kUnknown:  # lost on its way: again, from nothing
+            self.highs.clearSolver()
+            self.highs.run()
         self._check(self.highs.getModelStatus())
         solution = self.highs.getSolution()
         x = np.array(solution.col_value)
@@ -106,6 +120,10 @@ class WarmLP:
             np.array(solution.col_dual),
             int(self.highs.getInfo().simplex_iteration_count),
         )
+
+    def start_from(self, other: "WarmLP") -> None:
+        """Begin the next solve where the last one of another program of the same rows and columns ended."""
+        self.highs.setBasis(other.highs.getBasis())
 
     def _check(self, status: Any) -> None:
         kinds = highspy.HighsModelStatus
@@ -118,7 +136,9 @@ class WarmLP:
         raise SolverFailed(f"HiGHS ended with {self.highs.modelStatusToString(status)!r}: expected an optimum.")
 
 
-def _bounds(values: np.ndarray, size: int) -> np.ndarray:
-    found = np.broadcast_to(np.asarray(values, dtype=np.float64), (size,)).copy()
+def _bounds(name: str, values: np.ndarray, size: int) -> np.ndarray:
+    found = np.array(values, dtype=np.float64)
+    if found.shape != (size,) or np.isnan(found).any():
+        raise InvalidParameter(f"{name} has shape {found.shape}: expected {size} numbers, none of them NaN.")
     found[np.isposinf(found)], found[np.isneginf(found)] = highspy.kHighsInf, -highspy.kHighsInf
     return found

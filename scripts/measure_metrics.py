@@ -1,4 +1,4 @@
-"""Measure the exact metrics on a large grid: seconds each, and the peak of memory.
+"""Measure the exact metrics and reward distances on a large grid: seconds each, and the peak of memory.
 
 For example:
     python scripts/measure_metrics.py
@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from irl_gym import TabularReward, policy_iteration, tabulate
+from irl_gym.distances import MinimalNorm, dard, epic, spearman, starc
 from irl_gym.metrics import (
     agreement,
     best_tie,
@@ -32,7 +33,7 @@ from irl_gym.metrics import (
 
 
 def main(side: int = 317, gamma: float = 0.99, seed: int = 0) -> None:
-    """Time each metric on a slippery grid with a learned reward that is the true one with noise.
+    """Time each metric and distance on a slippery grid with a learned reward that is the true one with noise.
 
     Args:
         side: of the square grid; 317 makes 100,489 states.
@@ -58,8 +59,13 @@ def main(side: int = 317, gamma: float = 0.99, seed: int = 0) -> None:
         "optimal_actions and agreement": lambda: agreement(mdp, policy, optimal_actions(mdp, true)),
         "tie_aware_agreement": lambda: tie_aware_agreement(mdp, learned, expert),
         "occupancy_distance": lambda: occupancy_distance(mdp, policy, expert),
+        "EPIC": lambda: epic(mdp, learned, true),
+        "DARD": lambda: dard(mdp, learned, true),
+        "STARC, VAL": lambda: starc(mdp, learned, true),
+        "STARC, minimal norm": lambda: starc(mdp, learned, true, canonical=MinimalNorm()),
+        "Spearman": lambda: spearman(mdp, learned, true),
     }
-    shown = Table(title=f"Exact metrics, {mdp.n_states:,} states", title_justify="left")
+    shown = Table(title=f"Exact metrics and distances, {mdp.n_states:,} states", title_justify="left")
     for heading in ("metric", "value", "seconds"):
         shown.add_column(heading, justify="left" if heading == "metric" else "right")
     for name, metric in metrics.items():

@@ -21,7 +21,7 @@ from irl_gym.distances.payments import payments
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import InvalidMDP
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import policy_value
+from irl_gym.metrics import checked_mdp, policy_value
 
 FORGOTTEN = 1e-9
 """Time steps that are discounted by more than this are not looked at."""
@@ -47,11 +47,11 @@ def epic_bound(mdp: TabularMDP, true: Any, learned: Any) -> RegretBound:
     """Regret under `true` of a policy that is optimal under `learned`, and EPIC's bounds on it. Dense: S * A * S numbers.
 
     Raises:
-        InvalidMDP: a terminal state.
+        InvalidMDP: no table, or a terminal state.
         InvalidReward: wrong shape or not finite.
         UndefinedDistance: a canonical reward that is constant.
     """
-    if mdp.terminal.any():
+    if checked_mdp(mdp).terminal.any():
         raise InvalidMDP(
             f"state {np.flatnonzero(mdp.terminal)[0]} is terminal: EPIC's bound holds where none is. Let it follow itself."
         )

@@ -17,9 +17,10 @@ SAME_RANK = 1e-9
 
 def norm(values: Numbers, weights: Numbers, order: float) -> float:
     """(sum_i w_i |x_i|^p)^(1/p); the largest |x_i| where p is infinite."""
-    if np.isinf(order):
-        return float(np.abs(values).max())
-    return float((weights @ np.abs(values) ** order) ** (1 / order))
+    largest = float(np.abs(values).max())
+    if np.isinf(order) or largest == 0:
+        return largest
+    return largest * float((weights @ (np.abs(values) / largest) ** order) ** (1 / order))  # no power overflows
 
 
 def standardised(values: Numbers, weights: Numbers, rounding: float, name: str) -> Numbers:

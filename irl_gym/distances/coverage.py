@@ -15,6 +15,7 @@ from irl_gym._typing import Indices, Numbers
 from irl_gym.checks import float_array
 from irl_gym.errors import InvalidParameter, UndefinedDistance
 from irl_gym.mdp import TabularMDP, entry_rows
+from irl_gym.metrics import checked_mdp
 
 SUM_TOLERANCE = 1e-8
 
@@ -55,7 +56,7 @@ def coverage_of(mdp: TabularMDP, coverage: Any) -> Coverage:
         InvalidParameter: wrong shape, not a distribution, a step out of a terminal state, or no possible transition at all.
         UndefinedDistance: every state is terminal, so there are no transitions.
     """
-    if mdp.terminal.all():
+    if checked_mdp(mdp).terminal.all():
         raise UndefinedDistance("every state is terminal: no transition is left to compare rewards on.")
     S, A = mdp.n_states, mdp.n_actions
     if coverage is None:
@@ -74,8 +75,8 @@ def coverage_of(mdp: TabularMDP, coverage: Any) -> Coverage:
     wrong = np.argwhere((array > 0) & ~_acting(mdp, array.ndim))
     if wrong.size:
         raise InvalidParameter(
-            f"coverage{wrong[0].tolist()} is {array[tuple(wrong[0])]:.3g}, but state {wrong[0][0]} is terminal: expected 0. A "
-            "terminal state takes no step."
+            f"coverage{wrong[0].tolist()} is {array[tuple(wrong[0])]:.3g}, but state {wrong[0][0]} is terminal: expected 0, "
+            "since it takes no step. Pass None for uniform over the others."
         )
     if array.ndim == 2:
         return _along_P(mdp, array.ravel())

@@ -11,7 +11,7 @@ Rewards are (S,) paid on arrival, (S, A), (S, A, S) or a TabularReward; the two 
 Axes: S states, A actions, n transitions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,9 +20,9 @@ import numpy as np
 from irl_gym._typing import Numbers, Vector
 from irl_gym.distances.canonical import Canonical, FreshDraws, ModelDraws, ValueAdjustedLevelling
 from irl_gym.distances.comparing import ROUNDING, half_difference, norm, ranks, standardised
-from irl_gym.distances.coverage import coverage_of
+from irl_gym.distances.coverage import Coverage, coverage_of
 from irl_gym.distances.payments import payments
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.mdp import TabularMDP
 
 NORMS = (1, 2, np.inf)
@@ -46,12 +46,14 @@ class RewardDistance:
         """(n,) a reward in standard form, on the transitions of the coverage distribution.
 
         Raises:
-            InvalidReward: wrong shape or not finite.
+            InvalidMDP, InvalidReward: no table; a reward of the wrong shape or not finite.
             InvalidParameter: a distribution of the wrong shape, that does not sum to 1, or that misses all transitions.
             UndefinedDistance: a canonical reward that is constant, where a correlation is asked for.
         """
+        return self._standard(mdp, reward, name, coverage_of(mdp, self.coverage))
+
+    def _standard(self, mdp: TabularMDP, reward: Any, name: str, coverage: Coverage) -> Numbers:
         given = payments(mdp, reward, name)
-        coverage = coverage_of(mdp, self.coverage)
         values = self.form().values(mdp, given, coverage)
         return self._scaled(values, coverage.weights, ROUNDING * given.size / (1 - mdp.gamma), name)
 
@@ -59,19 +61,28 @@ class RewardDistance:
         """The distance of two rewards, between 0 and 1 (STARC with two different norms: at least 0).
 
         Raises:
-            InvalidReward: wrong shape or not finite.
+            InvalidMDP, InvalidReward: no table; a reward of the wrong shape or not finite.
             InvalidParameter: a distribution of the wrong shape, that does not sum to 1, or that misses all transitions.
             UndefinedDistance: a canonical reward that is constant, where a correlation is asked for.
         """
-        one, other = self.standard(mdp, first, "the first reward"), self.standard(mdp, second, "the second reward")
-        return half_difference(one, other, coverage_of(mdp, self.coverage).weights, self.order)
+        coverage = coverage_of(mdp, self.coverage)
+        one = self._standard(mdp, first, "the first reward", coverage)
+        other = self._standard(mdp, second, "the second reward", coverage)
+        return half_difference(one, other, coverage.weights, self.order)
 
     def _scaled(self, values: Numbers, weights: Numbers, rounding: float, name: str) -> Numbers:
         raise NotImplementedError
 
 
+class Correlation(RewardDistance):
+    """A distance that is sqrt((1 - rho) / 2), whatever the canonical form."""
+
+    def _scaled(self, values: Numbers, weights: Numbers, rounding: float, name: str) -> Numbers:
+        return standardised(values, weights, rounding, name)
+
+
 @dataclass(frozen=True, eq=False)
-class Pearson(RewardDistance):
+class Pearson(Correlation):
     """sqrt((1 - rho) / 2), rho the correlation of canonical rewards over the coverage distribution."""
 
     canonical: Canonical = field(default_factory=FreshDraws)
@@ -79,12 +90,12 @@ class Pearson(RewardDistance):
     coverage: np.ndarray | None = None
     """(S, A) or (S, A, S) distribution; None for uniform over pairs of states that act, s' from P."""
 
+    def __post_init__(self) -> None:
+        _check_canonical(self.canonical)
+
     def form(self) -> Canonical:
         """The canonical form."""
         return self.canonical
-
-    def _scaled(self, values: Numbers, weights: Numbers, rounding: float, name: str) -> Numbers:
-        return standardised(values, weights, rounding, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +107,7 @@ class Spearman(Pearson):
 
 
 @dataclass(frozen=True, eq=False)
-class EPIC(RewardDistance):
+class EPIC(Correlation):
     """The Equivalent-Policy Invariant Comparison of Gleave et al. (2021, definition 4.6)."""
 
     coverage: np.ndarray | None = None
@@ -110,11 +121,9 @@ class EPIC(RewardDistance):
         """The canonical form."""
         return FreshDraws(self.states, self.actions)
 
-    _scaled = Pearson._scaled
-
 
 @dataclass(frozen=True, eq=False)
-class DARD(RewardDistance):
+class DARD(Correlation):
     """The Dynamics-Aware Reward Distance of Wulfe et al. (2022)."""
 
     coverage: np.ndarray | None = None
@@ -126,8 +135,6 @@ class DARD(RewardDistance):
         """The canonical form."""
         return ModelDraws(self.actions)
 
-    _scaled = Pearson._scaled
-
 
 @dataclass(frozen=True, eq=False)
 class STARC(RewardDistance):
@@ -137,7 +144,7 @@ class STARC(RewardDistance):
     has s(R) = 0. The half makes opposite rewards 1 apart, as they are with EPIC; the paper leaves it out.
 
     Raises:
-        InvalidParameter: a norm that is not 1, 2 or infinite.
+        InvalidParameter: a norm that is not 1, 2 or infinite, or something else than a canonical form.
     """
 
     canonical: Canonical = field(default_factory=ValueAdjustedLevelling)
@@ -150,8 +157,9 @@ class STARC(RewardDistance):
     """(S, A) or (S, A, S) distribution; None for uniform over pairs of states that act. The bounds on regret need all pairs."""
 
     def __post_init__(self) -> None:
+        _check_canonical(self.canonical)
         for name, value in (("norm", self.norm), ("metric", self.metric)):
-            if isinstance(value, bool) or value not in NORMS:
+            if isinstance(value, bool | np.ndarray) or value not in NORMS:
                 raise InvalidParameter(f"{name} is {value!r}: expected 1, 2 or infinity (`numpy.inf`).")
 
     @property
@@ -168,7 +176,13 @@ class STARC(RewardDistance):
         return values / size if size > rounding else np.zeros_like(values)
 
 
-def distance_matrix(distance: RewardDistance, mdp: TabularMDP, rewards: Mapping[str, Any] | Sequence[Any]) -> np.ndarray:
+def _check_canonical(canonical: Any) -> None:
+    if isinstance(canonical, type) or not isinstance(canonical, Canonical):
+        what = canonical.__name__ if isinstance(canonical, type) else repr(canonical)
+        raise InvalidParameter(f"canonical is {what}: expected a canonical form, such as `MinimalNorm()`.")
+
+
+def distance_matrix(distance: RewardDistance, mdp: TabularMDP, rewards: Mapping[str, Any] | Iterable[Any]) -> np.ndarray:
     """(k, k) all distances between k rewards; each is put into standard form once.
 
     Args:
@@ -177,13 +191,19 @@ def distance_matrix(distance: RewardDistance, mdp: TabularMDP, rewards: Mapping[
         rewards: k rewards, or a mapping of names to them; the names appear in errors.
 
     Raises:
-        InvalidReward: wrong shape or not finite.
+        InvalidMDP, InvalidReward: no table; a reward of the wrong shape or not finite, or no rewards at all.
+        InvalidParameter: a distance that is no record, or with a distribution that is none of this table.
         UndefinedDistance: a canonical reward that is constant, where a correlation is asked for.
     """
+    if not isinstance(distance, RewardDistance):
+        what = getattr(distance, "__name__", repr(distance))
+        raise InvalidParameter(f"distance is {what}: expected a record, such as `EPIC()`.")
+    if not isinstance(rewards, Iterable):
+        raise InvalidReward(f"rewards is a {type(rewards).__name__}: expected several rewards, or a mapping of names to them.")
     named = rewards if isinstance(rewards, Mapping) else {f"reward {i}": one for i, one in enumerate(rewards)}
-    weights = coverage_of(mdp, distance.coverage).weights
-    standard = [distance.standard(mdp, one, name) for name, one in named.items()]
-    return np.array([[half_difference(x, y, weights, distance.order) for y in standard] for x in standard])
+    coverage = coverage_of(mdp, distance.coverage)
+    standard = [distance._standard(mdp, one, name, coverage) for name, one in named.items()]
+    return np.array([[half_difference(x, y, coverage.weights, distance.order) for y in standard] for x in standard])
 
 
 def epic(mdp: TabularMDP, first: Any, second: Any, *, coverage: Any = None, states: Any = None, actions: Any = None) -> float:

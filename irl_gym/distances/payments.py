@@ -15,6 +15,7 @@ from irl_gym._typing import Matrix, Vector
 from irl_gym.checks import float_array
 from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TabularMDP, entry_rows
+from irl_gym.metrics import checked_mdp
 from irl_gym.rewards import TabularReward
 
 
@@ -64,12 +65,13 @@ def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments
     """Read a reward of a table: a TabularReward, or an array (S,) paid on arrival, (S, A) or (S, A, S).
 
     Raises:
+        InvalidMDP: no table.
         InvalidReward: another shape than the table's, or values that are not finite.
     """
     values = reward.values if isinstance(reward, TabularReward) else reward
     if hasattr(values, "tabular"):
         raise InvalidReward(f"{name} is a {type(values).__name__}: expected a table. Pass `reward.tabular(states)`.")
-    S, A = mdp.n_states, mdp.n_actions
+    S, A = checked_mdp(mdp).n_states, mdp.n_actions
     array = float_array(name, values, "(S,), (S, A) or (S, A, S) numbers", InvalidReward)
     if array.shape not in ((S,), (S, A), (S, A, S)):
         raise InvalidReward(

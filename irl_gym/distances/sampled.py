@@ -8,7 +8,7 @@ for all transitions; its scatter is part of the error, and M bounds how small th
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from irl_gym.checks import float_array
 from irl_gym.distances.comparing import ROUNDING
 from irl_gym.distances.jackknife import Distance, correlation_distance, jackknife
 from irl_gym.distances.transitions import FreshSample, Transitions
-from irl_gym.errors import InvalidReward
+from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.features import batch_size, take
 
 RewardCall = Callable[[Any, np.ndarray, Any], Any]
 """R(observations, actions, next_observations) -> (N,) numbers."""
+
+Sample = TypeVar("Sample", Transitions, FreshSample)
 
 BLOCKS = 50
 """Blocks of transitions left out in turn."""
@@ -33,8 +35,13 @@ def paid(reward: RewardCall, observations: Any, actions: np.ndarray, next_observ
     """(N,) what a reward function says of transitions.
 
     Raises:
-        InvalidReward: it gives another shape, or a value that is not finite.
+        InvalidReward: it is no function, or gives another shape, or a value that is not finite.
     """
+    if not callable(reward):
+        raise InvalidReward(
+            f"the reward is a {type(reward).__name__}: expected a function of (observations, actions, next observations), such "
+            "as the `pay` of a TabularReward where observations are rows of its table."
+        )
     values = float_array("what the reward function returns", reward(observations, actions, next_observations),
                          "(N,) numbers", InvalidReward)  # fmt: skip
     if values.shape != (len(actions),):
@@ -49,6 +56,20 @@ def paid(reward: RewardCall, observations: Any, actions: np.ndarray, next_observ
     return values
 
 
+def checked_sample(sample: Any, kind: type[Sample]) -> Sample:
+    """Return a sample as it is.
+
+    Raises:
+        InvalidParameter: it is of another kind.
+    """
+    if isinstance(sample, kind):
+        return sample
+    made = "from_episodes(episodes)" if kind is Transitions else "from_transitions(transitions, gamma, rng=rng)"
+    raise InvalidParameter(
+        f"the sample is a {type(sample).__name__}: expected {kind.__name__}, such as `{kind.__name__}.{made}`."
+    )
+
+
 def sampled_epic(first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample) -> Distance:
     """EPIC distance of two reward functions: N * M evaluations of each.
 
@@ -60,9 +81,10 @@ def sampled_epic(first: RewardCall, second: RewardCall, transitions: Transitions
 
     Raises:
         InvalidReward: a function that gives another shape, or a value that is not finite.
+        InvalidParameter: something else than transitions or fresh draws.
         UndefinedDistance: a canonical reward that is constant on the transitions.
     """
-    return sampled_pearson(first, second, transitions, fresh)
+    return _correlated(first, second, transitions, checked_sample(fresh, FreshSample), ranked=False)
 
 
 def sampled_pearson(
@@ -72,6 +94,7 @@ def sampled_pearson(
 
     Raises:
         InvalidReward: a function that gives another shape, or a value that is not finite.
+        InvalidParameter: something else than transitions or fresh draws.
         UndefinedDistance: a reward that is constant on the transitions.
     """
     return _correlated(first, second, transitions, fresh, ranked=False)
@@ -84,6 +107,7 @@ def sampled_spearman(
 
     Raises:
         InvalidReward: a function that gives another shape, or a value that is not finite.
+        InvalidParameter: something else than transitions or fresh draws.
         UndefinedDistance: a reward that is constant on the transitions.
     """
     return _correlated(first, second, transitions, fresh, ranked=True)
@@ -92,6 +116,8 @@ def sampled_spearman(
 def _correlated(
     first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None, *, ranked: bool
 ) -> Distance:
+    transitions = checked_sample(transitions, Transitions)
+    fresh = None if fresh is None else checked_sample(fresh, FreshSample)
     forms = [_Canonical(reward, transitions, fresh) for reward in (first, second)]
     x, y = (form.values(None) for form in forms)
     rounding = max(form.rounding for form in forms)

@@ -13,12 +13,15 @@ import numpy as np
 from irl_gym.checks import checked_number
 from irl_gym.distances.comparing import ROUNDING
 from irl_gym.distances.jackknife import Distance, jackknife, replicated_distance
-from irl_gym.distances.models import Model
-from irl_gym.distances.sampled import BLOCKS, RewardCall, paid
+from irl_gym.distances.models import Model, stepped
+from irl_gym.distances.sampled import BLOCKS, RewardCall, checked_sample, paid
 from irl_gym.distances.transitions import Transitions
 from irl_gym.errors import InvalidParameter
+from irl_gym.intervals import checked_rng
 from irl_gym.mdp import check_discount
 
+ROWS = 20_000
+"""Rollouts made side by side, or as many as there are transitions."""
 Acting = Callable[[Any, np.random.Generator], np.ndarray]
 """A policy: (observations, rng) -> (N, ...) actions."""
 
@@ -47,20 +50,24 @@ def sampled_dard(
         rng: for the draws.
 
     Raises:
-        InvalidParameter: observations that are not arrays, or a number out of range.
+        InvalidParameter: observations that are not arrays, a number out of range, or an argument of another kind.
         InvalidReward: a function that gives another shape, or a value that is not finite.
         UndefinedDistance: a canonical reward that is constant on the transitions.
     """
-    gamma, K = check_discount(gamma), _replicates(replicates)
+    gamma, K, rng = check_discount(gamma), _replicates(replicates), checked_rng(rng)
+    choices, model = np.asarray(actions), _called("model", model, "`TableModel(mdp)`")
+    if not (choices.ndim and len(choices)):
+        raise InvalidParameter(f"actions is {actions!r}: expected an array of actions to draw from, such as `np.arange(A)`.")
+    transitions = checked_sample(transitions, Transitions)
     here, following = _array(transitions.observations), _array(transitions.next_observations)
     ended, rewards = transitions.ended, (first, second)
     values = np.empty((2, len(transitions), K))
     given = [paid(reward, here, transitions.actions, following) for reward in rewards]
     for k in range(K):
-        drawn = np.asarray(actions)[rng.integers(len(actions), size=len(transitions))]
-        after_here, _ = model(here, drawn, rng)
+        drawn = choices[rng.integers(len(choices), size=len(transitions))]
+        after_here, _ = stepped(model, here, drawn, rng)
         after_next = np.array(following)
-        after_next[~ended] = model(following, drawn, rng)[0][~ended]
+        after_next[~ended] = stepped(model, following, drawn, rng)[0][~ended]
         for r, reward in enumerate(rewards):
             more = paid(reward, following, drawn, after_next) - paid(reward, after_here, drawn, after_next)
             values[r, :, k] = given[r] + gamma * more - paid(reward, here, drawn, after_here)
@@ -96,17 +103,24 @@ def sampled_starc(
         rng: for the draws.
 
     Raises:
-        InvalidParameter: observations that are not arrays, or a number out of range.
+        InvalidParameter: observations that are not arrays, a number out of range, or an argument of another kind.
         InvalidReward: a function that gives another shape, or a value that is not finite.
         UndefinedDistance: a canonical reward that is 0 on the transitions, or drowned in noise.
     """
-    gamma, K = check_discount(gamma), _replicates(replicates)
+    gamma, K, rng = check_discount(gamma), _replicates(replicates), checked_rng(rng)
+    model = _called("model", model, "`TableModel(mdp)`")
+    policy = _called("policy", policy, "`lambda observations, rng: agent.predict(observations)[0]`")
+    transitions = checked_sample(transitions, Transitions)
     steps = int(checked_number("horizon", horizon, "a whole number of at least 1", least=1, whole=True))
     here, rewards = _array(transitions.observations), (first, second)
     values = np.empty((2, len(transitions), K))
-    for k in range(K):
-        gains = _returns(rewards, model, policy, here, transitions.actions, gamma, steps, rng)
-        values[:, :, k] = gains - _returns(rewards, model, policy, here, None, gamma, steps, rng)
+    together = max(ROWS // len(here), 1)
+    for done in range(0, K, together):
+        k = min(together, K - done)
+        many, begin = np.repeat(here, k, axis=0), np.repeat(transitions.actions, k, axis=0)
+        gains = _returns(rewards, model, policy, many, begin, gamma, steps, rng)
+        gains -= _returns(rewards, model, policy, many, None, gamma, steps, rng)
+        values[:, :, done : done + k] = gains.reshape(2, -1, k)
     return _estimated(values, transitions, gamma, centred=False)
 
 
@@ -125,10 +139,10 @@ def _returns(
     going, discount = np.ones(len(here), dtype=bool), 1.0
     for t in range(steps):
         drawn = begin if t == 0 and begin is not None else policy(here, rng)
-        following, ended = model(here, drawn, rng)
+        following, ended = stepped(model, here, np.asarray(drawn), rng)
         for r, reward in enumerate(rewards):
             total[r, going] += discount * paid(reward, here[going], np.asarray(drawn)[going], following[going])
-        going = going & ~np.asarray(ended, dtype=bool)
+        going = going & ~ended
         here, discount = following, discount * gamma
         if not going.any():
             break
@@ -150,6 +164,12 @@ def _estimated(values: np.ndarray, transitions: Transitions, gamma: float, *, ce
 
 def _replicates(replicates: Any) -> int:
     return int(checked_number("replicates", replicates, "a whole number of at least 2", least=2, whole=True))
+
+
+def _called(name: str, given: Any, such: str) -> Any:
+    if callable(given):
+        return given
+    raise InvalidParameter(f"{name} is a {type(given).__name__}: expected a function, such as {such}.")
 
 
 def _array(observations: Any) -> np.ndarray:

@@ -13,9 +13,13 @@ import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import InvalidParameter, UndefinedDistance
-from irl_gym.features import batch_size, take
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDistance
+from irl_gym.features import batch_size, by_part, take
+from irl_gym.intervals import checked_rng
 from irl_gym.mdp import check_discount
+
+OPTIONAL = ("terminated", "groups", "terminal")
+"""Parts of a sample that may be None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,7 @@ class Transitions:
     """N transitions (s, a, s') from a coverage distribution.
 
     Raises:
-        InvalidParameter: lengths that do not fit together.
+        InvalidParameter: parts that are not arrays, or lengths that do not fit together.
         UndefinedDistance: fewer than two transitions.
     """
 
@@ -39,14 +43,7 @@ class Transitions:
     """(N,) integers: transitions of one group, such as an episode, depend on each other. None: independent, or in order."""
 
     def __post_init__(self) -> None:
-        counts = {"observations": batch_size(self.observations), "next_observations": batch_size(self.next_observations)}
-        n = len(self.actions)
-        for name in ("terminated", "groups"):
-            if getattr(self, name) is not None:
-                counts[name] = len(getattr(self, name))
-        wrong = {name: count for name, count in counts.items() if count != n}
-        if wrong:
-            raise InvalidParameter(f"there are {n} actions and {wrong}: expected as many of each, one a transition.")
+        n = _checked_lengths(self, ("observations", "next_observations", "terminated", "groups"))
         if n < 2:
             raise UndefinedDistance(f"there are {n} transitions: expected at least 2, and for an error of the distance many.")
 
@@ -63,9 +60,14 @@ class Transitions:
         """Every step of some episodes; an episode is a group.
 
         Raises:
+            InvalidDemonstrations: something else than episodes.
             UndefinedDistance: fewer than two steps.
         """
-        kept = list(episodes)
+        kept = list(episodes) if isinstance(episodes, Iterable) else [episodes]
+        for wrong in (one for one in kept if not isinstance(one, Episode)):
+            raise InvalidDemonstrations(
+                f"there is a {type(wrong).__name__} where an episode is expected: give Episodes, such as those of `collect`."
+            )
         if not kept:
             raise UndefinedDistance("there are no episodes: expected at least one, with two transitions or more.")
         return cls(
@@ -92,7 +94,7 @@ class FreshSample:
     """M draws of a state from D_S and an action from D_A, and the discount: what EPIC's canonical form needs.
 
     Raises:
-        InvalidParameter: lengths that do not fit together, or fewer than 2 draws.
+        InvalidParameter: parts that are not arrays, lengths that do not fit together, or fewer than 2 draws.
         InvalidDiscount: gamma outside (0, 1).
     """
 
@@ -107,9 +109,9 @@ class FreshSample:
 
     def __post_init__(self) -> None:
         check_discount(self.gamma)
-        n = len(self.actions)
-        if n < 2 or batch_size(self.states) != n or (self.terminal is not None and len(self.terminal) != n):
-            raise InvalidParameter(f"there are {batch_size(self.states)} states and {n} actions: expected as many, at least 2.")
+        n = _checked_lengths(self, ("states", "terminal"))
+        if n < 2:
+            raise InvalidParameter(f"there are {n} draws: expected at least 2, and for a small error of the distance many.")
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -123,10 +125,39 @@ class FreshSample:
     def from_transitions(
         cls, transitions: Transitions, gamma: float, *, n: int = 256, rng: np.random.Generator
     ) -> "FreshSample":
-        """Draw M next states and, independently, M actions of transitions: D_S and D_A are those of the data."""
+        """Draw M next states and, independently, M actions of transitions: D_S and D_A are those of the data.
+
+        Raises:
+            InvalidParameter: n that is not a whole number of at least 2, or an rng that is none.
+            InvalidDiscount: gamma outside (0, 1).
+        """
+        rng = checked_rng(rng)
         n = int(checked_number("n", n, "a whole number of at least 2", least=2, whole=True))
         states, actions = rng.integers(len(transitions), size=(2, n))
         return cls(gamma, take(transitions.next_observations, states), transitions.actions[actions], transitions.ended[states])
+
+
+def _checked_lengths(sample: Any, names: tuple[str, ...]) -> int:
+    """The number of actions of a sample, whose other parts, where they are given, have to be as many."""
+    given = {name: getattr(sample, name) for name in ("actions", *names)}
+    counts = {name: _length(name, part) for name, part in given.items() if part is not None or name not in OPTIONAL}
+    n = counts.pop("actions")
+    wrong = {name: count for name, count in counts.items() if count != n}
+    if wrong:
+        raise InvalidParameter(f"there are {n} actions and {wrong}: expected as many of each.")
+    return n
+
+
+def _length(name: str, batch: Any) -> int:
+    def check(part: Any) -> None:
+        if not (isinstance(part, np.ndarray) and part.ndim):
+            raise InvalidParameter(
+                f"{name} is a {type(part).__name__}: expected an array, or a dict or tuple of arrays, with one entry for each. "
+                "Stack a list with `np.array`."
+            )
+
+    by_part(check, batch)
+    return batch_size(batch)
 
 
 def joined(batches: Sequence[Any]) -> Any:

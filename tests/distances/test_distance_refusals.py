@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from models import random_model
 
-from irl_gym.distances import EPIC, STARC, MinimalNorm, dard, distance_matrix, epic, pearson, spearman, starc
+from irl_gym.distances import EPIC, STARC, MinimalNorm, TableModel, dard, distance_matrix, epic, pearson, spearman, starc
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.random_rewards import shaped
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward, UndefinedDistance
@@ -86,7 +86,7 @@ def test_distributions_of_the_canonical_form_are_checked(given, said, unchecked)
         epic(MDP, R, -R, **given)
 
 
-@pytest.mark.parametrize("wrong", [0, 3, "2", True, None])
+@pytest.mark.parametrize("wrong", [0, 3, "2", True, None, [1, 2], np.array([1, 2])])
 def test_a_norm_is_1_2_or_infinite(wrong, unchecked):
     with pytest.raises(InvalidParameter, match=r"metric is .*: expected 1, 2 or infinity"):
         starc(MDP, R, -R, metric=wrong)
@@ -102,3 +102,39 @@ def test_a_table_without_transitions_has_no_distances(distance):
 def test_the_bound_is_for_tables_without_terminal_states():
     with pytest.raises(InvalidMDP, match="state 4 is terminal"):
         epic_bound(MDP, R, -R)
+
+
+@pytest.mark.parametrize("call", [
+    lambda mdp: epic(mdp, R, -R),
+    lambda mdp: starc(mdp, R, -R),
+    lambda mdp: distance_matrix(EPIC(), mdp, [R, -R]),
+    lambda mdp: epic_bound(mdp, R, -R),
+    TableModel,
+])  # fmt: skip
+def test_something_else_than_a_table_is_refused(call, unchecked):
+    with pytest.raises(InvalidMDP, match="mdp is a str: expected a TabularMDP"):
+        call("FrozenLake-v1")
+
+
+@pytest.mark.parametrize("distance", [starc, pearson, spearman])
+@pytest.mark.parametrize("wrong", ["VAL", MinimalNorm, EPIC()])
+def test_something_else_than_a_canonical_form_is_refused(distance, wrong, unchecked):
+    with pytest.raises(InvalidParameter, match=r"canonical is .*: expected a canonical form, such as `MinimalNorm\(\)`"):
+        distance(MDP, R, -R, canonical=wrong)
+
+
+@pytest.mark.parametrize("wrong", [epic, EPIC, "EPIC"])
+def test_a_matrix_is_of_a_record(wrong, unchecked):
+    with pytest.raises(InvalidParameter, match=r"expected a record, such as `EPIC\(\)`"):
+        distance_matrix(wrong, MDP, [R, -R])
+
+
+def test_a_matrix_is_of_several_rewards(unchecked):
+    with pytest.raises(InvalidReward, match="rewards is a NoneType"):
+        distance_matrix(EPIC(), MDP, None)
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e200])
+@pytest.mark.parametrize("distance", [epic, dard, starc])
+def test_a_very_small_or_large_scale_is_ignored_too(distance, scale):
+    assert distance(MDP, R, scale * R) < 1e-8

@@ -1,0 +1,224 @@
+"""The evidence that the doctor works on: a table, an expert, a reward, and what the learner's certificate says.
+
+It can be made of a result in memory and of a run's folder alike. What follows from P, the expert and R is computed here again;
+of the certificate are taken only what it alone knows: the terms of the program, its bound, and sampled values.
+Axes: S states, A actions, n rows of (4) among the reachable states in which the expert is known.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
+from irl_gym.certificate import least_per_state, row_margins, tolerated
+from irl_gym.comparisons import compare
+from irl_gym.dynamic_programming import Solution, policy_iteration, tied
+from irl_gym.errors import DegenerateExpert, IrlGymError
+from irl_gym.learners.base import IRLResult
+from irl_gym.learners.feature_rows import completed
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.mdp import TabularMDP
+from irl_gym.metrics import TIE_TOLERANCE
+from irl_gym.policies import as_distribution
+from irl_gym.rewards import TabularReward
+
+SMALL = 2_000
+"""Reachable states up to which programs are solved again, to say what another learner would find."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The rows of (4), with what they are worth under R."""
+
+    states: np.ndarray
+    """(n,) rows of the table."""
+    actions: np.ndarray
+    """(n,) the action that the expert's is compared with."""
+    equal: np.ndarray
+    """(n,) the expert takes this action too."""
+    trivial: np.ndarray
+    """(n,) both actions have the same successors."""
+    margins: np.ndarray
+    """(n,) Q(s, pi) - Q(s, a); NaN without a reward."""
+    usable: np.ndarray
+    """(n,) rows that a reward of this kind can give a margin."""
+
+    @property
+    def violations(self) -> np.ndarray:
+        """(n,) by how much each row of (4) is violated."""
+        return np.where(self.equal, np.abs(self.margins), np.maximum(-self.margins, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is known of one learned reward."""
+
+    mdp: TabularMDP | None = None
+    """The table; None where the environment was only stepped."""
+    expert: Any = None
+    """(S,) actions, (S, A) probabilities, NaN where nothing is known, or (S, A) set; None where it is not known at all."""
+    reward: TabularReward | None = None
+    """R in the table; None where no reward came out, or there is no table."""
+    claims: Mapping[str, Any] = field(default_factory=dict)
+    """The certificate's `to_json()`; empty where there is none."""
+    status: str = ""
+    """What became of the program, in a sentence."""
+    stats: Mapping[str, Any] = field(default_factory=dict)
+    """Solver, attempts, rounds."""
+    true: TabularReward | None = None
+    """The true reward, where it is known."""
+    shaped: bool = False
+    """Is the agent retrained on the expected advantage?"""
+
+    @cached_property
+    def on_states(self) -> bool:
+        """Is R a reward on states?"""
+        return self.reward is None or self.reward.on_states
+
+    @cached_property
+    def states(self) -> Indices:
+        """The reachable states."""
+        return np.zeros(0, dtype=np.int64) if self.mdp is None else np.flatnonzero(self.mdp.reachable)
+
+    @cached_property
+    def acting(self) -> StateMask:
+        """(S,) reachable states that are not terminal."""
+        return np.zeros(0, dtype=bool) if self.mdp is None else self.mdp.reachable & ~self.mdp.terminal
+
+    @cached_property
+    def small(self) -> bool:
+        """Is the table small enough to solve programs again?"""
+        return 0 < self.states.size <= SMALL
+
+    @cached_property
+    def _completed(self) -> tuple[Matrix, StateMask]:
+        assert self.mdp is not None
+        policy, known = completed(self.expert, self.mdp.n_states)
+        return as_distribution(policy, self.mdp.n_states, self.mdp.n_actions), known
+
+    @property
+    def distribution(self) -> Matrix:
+        """(S, A) the expert, uniform where nothing is known of it. Ask only where there is one."""
+        return self._completed[0]
+
+    @cached_property
+    def known(self) -> StateMask:
+        """(S,) where the expert is known; nowhere without a table or an expert."""
+        return np.zeros_like(self.acting) if self.mdp is None or self.expert is None else self._completed[1]
+
+    @cached_property
+    def has_expert(self) -> bool:
+        """Is the expert known in any reachable state where it acts?"""
+        return bool((self.known & self.acting).any())
+
+    @cached_property
+    def fully_known(self) -> bool:
+        """Is the expert known wherever it can act?"""
+        return self.has_expert and bool(self.known[self.acting].all())
+
+    @cached_property
+    def optimum(self) -> Solution | None:
+        """What acting best is worth under R."""
+        return None if self.mdp is None or self.reward is None else policy_iteration(self.mdp, self.reward, tolerance=0.0)
+
+    @cached_property
+    def true_optimum(self) -> Solution | None:
+        """What acting best is worth under the true reward."""
+        return None if self.mdp is None or self.true is None else policy_iteration(self.mdp, self.true)
+
+    @cached_property
+    def scale(self) -> float:
+        """The largest |R| of a reachable state."""
+        return 0.0 if self.reward is None else float(np.abs(self.reward.values[self.states]).max(initial=0.0))
+
+    @cached_property
+    def tolerance(self) -> float:
+        """A margin or a violation below this is the solvers' rounding."""
+        if self.mdp is None or self.reward is None:
+            return 0.0
+        return tolerated(TabularReward(self.reward.values[self.states]), self.mdp.gamma)
+
+    @cached_property
+    def ties(self) -> ActionSets:
+        """(S, A) actions that are greedy under R. Ask only where there is a reward in a table."""
+        assert self.optimum is not None
+        return tied(self.optimum.Q, TIE_TOLERANCE * self.scale)
+
+    @cached_property
+    def rows(self) -> Rows | None:
+        """The rows of (4); None without a table or an expert."""
+        return self.rows_at(None) if self.has_expert else None
+
+    def rows_at(self, gamma: float | None) -> Rows:
+        """The rows of (4) for another discount, or for the table's own."""
+        assert self.mdp is not None
+        keep = self.states
+        part = self.mdp.restrict(keep)
+        if gamma is not None:
+            part = TabularMDP(part.P, gamma, part.d0)
+        c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
+        margins = np.full(c.states.size, np.nan)
+        if self.reward is not None:
+            R = TabularReward(self.reward.values[keep])
+            if self.fully_known:
+                margins = row_margins(part, c, R)
+            else:  # what follows an unknown state is worth what acting best is, as in `learners.soft_certificate`
+                Q = policy_iteration(part, R, tolerance=0.0).Q
+                margins = (c.distribution * Q).sum(axis=1)[c.states] - Q[c.states, c.actions]
+        usable = ~c.equal & (~c.trivial | (not self.on_states))
+        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, usable)
+
+    @cached_property
+    def least(self) -> Vector:
+        """(S,) the smallest margin of each state; NaN where it has no row that a reward can move."""
+        if self.rows is None or self.mdp is None or self.reward is None:
+            return np.full(self.acting.size, np.nan)
+        usable = self.rows.usable
+        return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
+
+    @cached_property
+    def speaks(self) -> bool:
+        """Does R prefer some action to another, in a table with an expert?"""
+        if self.optimum is None or not self.has_expert:
+            return False
+        Q = self.optimum.Q[self.acting]
+        return bool((Q.max(axis=1) - Q.min(axis=1)).max(initial=0.0) > self.tolerance)
+
+    @cached_property
+    def judges_states(self) -> bool:
+        """Does the learner promise margins in states? Not where it compares sampled values of whole policies."""
+        return "gaps" not in self.claims
+
+    @cached_property
+    def linear(self) -> bool:
+        """Is R in the span of features?"""
+        return "n_features" in self.claims
+
+    def learner(self, **changes: Any) -> FiniteLP:
+        """FiniteLP with capped margins, for rewards of this kind."""
+        kind: Literal["state", "state-action"] = "state" if self.on_states else "state-action"
+        unvisited = "avoid" if self.reward is None else self.reward.note.get("unvisited", "avoid")
+        return replace(FiniteLP(reward_on=kind, unvisited=unvisited), **changes)
+
+    @cached_property
+    def can_have_margin(self) -> StateMask | None:
+        """(S,) states in which some reward gives the expert a margin; None where that is not known."""
+        if self.best is None or isinstance(self.best, DegenerateExpert):
+            return None
+        certificate = self.best.certificate
+        return np.nan_to_num(certificate.margin) > certificate.margin_cap / 2
+
+    @cached_property
+    def best(self) -> IRLResult | DegenerateExpert | None:
+        """What FiniteLP with hard rows and capped margins finds; why there is nothing; None where that is not known."""
+        if not (self.small and self.has_expert and self.mdp is not None):
+            return None
+        try:
+            return self.learner().fit(self.mdp, self.expert)
+        except DegenerateExpert as reason:
+            return reason
+        except IrlGymError:  # a solver without an answer: nothing is claimed
+            return None

@@ -1,0 +1,85 @@
+"""What the doctor says: findings, each a sentence and a mend, and the diagnosis that they make."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from irl_gym._typing import Indices
+
+MOST_NAMED = 5
+"""States that a sentence names; the others are counted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One thing that is wrong, or that makes the reward less useful than it could be."""
+
+    name: str
+    """Short and fixed, such as "lambda-above-lambda-0"."""
+    sentence: str
+    """What is the case, with numbers."""
+    mend: str
+    """What to do about it."""
+    states: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(k,) rows of the table that it is about; none where it is about all of it."""
+    actions: tuple[int, ...] = ()
+    """k actions, one for each of the states, which are repeated where several actions are meant; or none."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As json holds it."""
+        return {
+            "name": self.name,
+            "sentence": self.sentence,
+            "mend": self.mend,
+            "states": self.states.tolist(),
+            "actions": list(self.actions),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """All that the doctor found."""
+
+    findings: tuple[Finding, ...]
+    """In order of importance."""
+    examined: str
+    """What was looked at, in a sentence."""
+
+    @property
+    def healthy(self) -> bool:
+        """Was nothing found?"""
+        return not self.findings
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the findings."""
+        return tuple(one.name for one in self.findings)
+
+    def __str__(self) -> str:
+        """The diagnosis as a person reads it."""
+        if self.healthy:
+            return f"Healthy. {self.examined}"
+        told = [f"{number}. {one.sentence}\n   Mend: {one.mend}" for number, one in enumerate(self.findings, start=1)]
+        count = "1 finding" if len(told) == 1 else f"{len(told)} findings"
+        return "\n".join([f"{count}. {self.examined}", *told])
+
+    def to_json(self) -> dict[str, Any]:
+        """As json holds it."""
+        return {
+            "healthy": self.healthy,
+            "examined": self.examined,
+            "findings": [one.to_json() for one in self.findings],
+        }
+
+
+def named(states: np.ndarray, actions: np.ndarray | None = None) -> str:
+    """The first few states, or pairs of state and action, and how many more there are."""
+    told = [f"s={s}" for s in states] if actions is None else [f"s={s} a={a}" for s, a in zip(states, actions, strict=True)]
+    more = len(told) - MOST_NAMED
+    return ", ".join(told) if more <= 0 else f"{', '.join(told[:MOST_NAMED])} and {more:,} more"
+
+
+def counted(count: int, what: str = "state") -> str:
+    """A number with its noun."""
+    return f"{count:,} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,64 @@
+"""What a run that did not finish left in its folder, as far as a doctor can use it.
+
+A learner that finds no reward stops the run after the expert: then the table and the expert are there, and say why.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from minari.serialization import deserialize_space
+
+from irl_gym.datasets import read_minari
+from irl_gym.demonstrated import most_frequent
+from irl_gym.demonstrations import empirical_policy
+from irl_gym.diagnoses.case import Case
+from irl_gym.errors import IrlGymError
+from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.rewards import UNREADABLE, TabularReward
+from irl_gym.run_folder import RECORDS, read_json
+from irl_gym.table_files import TABLE, load_table
+from irl_gym.tabulation import Tabulation
+
+
+def left_behind(path: Path) -> Case | None:
+    """The case that a folder's files make; None where they are not enough, or cannot be read."""
+    try:
+        config = read_json(path / "config.json")
+        space = deserialize_space(read_json(path / "environment.json")["observations"])
+        table = load_table(path / TABLE, space)
+        record = _maybe(path / RECORDS / "reward.json")
+        learned = load_reward(path / "reward.npz") if record else None
+        expert = _expert(path, config, table)
+    except (*UNREADABLE, IrlGymError):
+        return None
+    claims = _maybe(path / "certificate.json") if record else {}
+    reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
+    if reward is not None and not isinstance(reward, TabularReward):
+        return None
+    return Case(
+        table.mdp, expert, reward, claims, record.get("status", ""), record.get("stats", {}), table.reward,
+        bool(config.get("shaping")),
+    )  # fmt: skip
+
+
+def _maybe(path: Path) -> dict[str, Any]:
+    return read_json(path) if path.exists() else {}
+
+
+def _expert(path: Path, config: dict[str, Any], table: Tabulation) -> np.ndarray:
+    if config.get("epsilon"):
+        return seen_with_noise(path, table)
+    with np.load(path / "expert.npz", allow_pickle=False) as archive:
+        return archive["actions"]
+
+
+def seen_with_noise(path: Path, table: Tabulation) -> np.ndarray:
+    """(S, A) what a learner knows of an expert with noise: its most frequent actions, NaN where it was never seen.
+
+    Raises:
+        DatasetMissing: the run's demonstrations are gone.
+    """
+    dataset_id = read_json(path / RECORDS / "demonstrations.json")["dataset_id"]
+    episodes = list(read_minari(dataset_id, root=path / "dataset"))
+    return most_frequent(empirical_policy(episodes, table.states, table.mdp.n_actions))

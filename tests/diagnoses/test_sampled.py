@@ -1,0 +1,54 @@
+"""What only the certificates of FeatureLP and TrajectoryLP know."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import paper_grid
+from patients import finding, names, sampled
+
+from irl_gym.learners.feature import FeatureLP
+
+GRID = paper_grid()
+FEW = np.random.default_rng(0).normal(size=(25, 2))
+
+
+def test_features_that_cannot_express_a_reward_are_told():
+    said = finding("inexpressible", FeatureLP(FEW).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert)
+    assert "2 features" in said.sentence
+
+
+def test_one_feature_a_state_mends_features_that_cannot_express():
+    enough = FeatureLP(np.eye(25), margin_cap="auto").fit(GRID.mdp, GRID.expert)
+    assert names(enough, GRID.mdp, GRID.expert, true=GRID.R) == ()
+
+
+def test_margins_within_their_noise_are_told():
+    result = FeatureLP(np.eye(25), margin_cap="auto").fit(GRID.mdp, GRID.expert)
+    noisy = replace(result, certificate=replace(result.certificate, standard_error=10.0))
+    assert names(noisy, None, None) == ("noisy-rows",)
+
+
+def test_small_standard_errors_are_no_finding():
+    result = FeatureLP(np.eye(25), margin_cap="auto").fit(GRID.mdp, GRID.expert)
+    assert names(replace(result, certificate=replace(result.certificate, standard_error=1e-6)), None, None) == ()
+
+
+def test_trajectories_in_which_nothing_is_wrong_are_healthy():
+    assert names(sampled(), None, None) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("planner-fell-short", {"regret": -1.0}),
+        ("expert-beaten", {"regret": 1.0}),
+        ("expert-beaten", {"gaps": np.array([3.0, -1.0])}),
+        ("too-few-trajectories", {"gap_errors": np.array([5.0, 5.0])}),
+        ("cut-short", {"truncation": 4.0}),
+        ("cut-short", {"stats": {"episodes_dropped": 3}}),
+        ("zero-weights", {"zero": True}),
+    ],
+)
+def test_each_fault_of_trajectories_has_its_sentence(name, changes):
+    assert names(sampled(**changes), None, None) == (name,)

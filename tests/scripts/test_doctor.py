@@ -1,0 +1,69 @@
+"""The script as a person runs it, on runs that went well, badly, and not to their end."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
+from irl_gym.experiment import Experiment
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import ValueIteration
+from irl_gym.runs import read_run
+
+SCRIPT = Path(__file__).parents[2] / "scripts" / "doctor.py"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Finished runs: a healthy one, one of the paper's own program, one of an expert with noise."""
+    folder = tmp_path_factory.mktemp("runs")
+    plain = {"env_id": "FrozenLake-v1", "gamma": 0.99, "retrain": ValueIteration(), "episodes": 30, "eval_episodes": 5}
+    for name, changes in {
+        "healthy": {},
+        "paper": {"learner": FiniteLP(margin_cap=None)},
+        "noisy": {"epsilon": 0.1, "episodes": 200},
+    }.items():
+        recover_and_retrain(Experiment(**{**plain, **changes}), folder / name)
+    return folder
+
+
+def doctor(folder):
+    return subprocess.run([sys.executable, str(SCRIPT), "--run", str(folder)], capture_output=True, text=True, timeout=120)
+
+
+def test_a_healthy_run_exits_with_0(runs):
+    done = doctor(runs / "healthy")
+    assert done.returncode == 0 and done.stdout.startswith("Healthy. Examined: 11 states") and done.stderr == ""
+
+
+def test_findings_exit_with_1_and_are_printed_with_their_mends(runs):
+    done = doctor(runs / "paper")
+    assert done.returncode == 1 and "avoidable-ties" in done.stdout and 'Mend: margin_cap="auto"' in done.stdout
+
+
+def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(runs, tmp_path):
+    shutil.copytree(runs / "healthy", tmp_path / "killed")
+    (tmp_path / "killed" / ".stages" / "reward.json").unlink()
+    done = doctor(tmp_path / "killed")
+    assert done.returncode == 1 and "'reward' was not finished" in done.stderr and "no-reward" in done.stdout
+
+
+def test_a_folder_without_a_run_exits_with_2(tmp_path):
+    done = doctor(tmp_path)
+    assert done.returncode == 2 and "holds no run" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_an_expert_with_noise_is_judged_by_what_its_episodes_show(runs):
+    assert "nothing-to-compare" not in diagnose_run(read_run(runs / "noisy")).names
+
+
+def test_an_unfinished_run_with_its_reward_is_diagnosed_as_a_finished_one(runs):
+    assert diagnose_unfinished(runs / "paper").to_json() == diagnose_run(read_run(runs / "paper")).to_json()
+
+
+def test_a_folder_that_holds_too_little_has_no_diagnosis(tmp_path):
+    assert diagnose_unfinished(tmp_path) is None

@@ -1,0 +1,96 @@
+"""The doctor: no false alarm on the environments of the first issue, and what a diagnosis is."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from conftest import KWARGS
+from hypothesis import given
+from models import models, paper_grid
+from patients import judged, names
+
+from irl_gym.diagnosis import CHECKS, Diagnosis, Finding, doctor
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward
+from irl_gym.learners.finite import FiniteLP
+
+GRID = paper_grid()
+
+
+@pytest.mark.parametrize("name", [one for one in KWARGS if one != "CliffWalking slippery"])
+def test_the_default_learner_is_healthy(toy_text, name):
+    table = toy_text(name)
+    expert = policy_iteration(table.mdp, table.reward).policy
+    result = FiniteLP(report_lambda_0=True).fit(table.mdp, expert)
+    assert doctor(result, table.mdp, expert, true=table.reward).healthy and doctor(result, table.mdp, expert).healthy
+
+
+def test_slippery_cliff_walking_is_told_what_no_state_reward_can_say(toy_text):
+    table = toy_text("CliffWalking slippery")
+    expert = policy_iteration(table.mdp, table.reward).policy
+    found = names(FiniteLP().fit(table.mdp, expert), table.mdp, expert, true=table.reward)
+    assert found == ("worst-tie", "same-successors")
+
+
+def test_slippery_cliff_walking_is_healthy_with_a_reward_on_steps(toy_text):
+    table = toy_text("CliffWalking slippery")
+    expert = policy_iteration(table.mdp, table.reward).policy
+    result = FiniteLP(reward_on="state-action").fit(table.mdp, expert)
+    assert doctor(result, table.mdp, expert, true=table.reward).healthy
+
+
+@given(models())
+def test_the_default_learner_is_healthy_on_random_tables(model):
+    result = FiniteLP().fit(model.mdp, model.expert)
+    assert doctor(result, model.mdp, model.expert, true=model.step_reward).healthy
+
+
+def test_a_diagnosis_reads_as_sentences_with_their_mends():
+    text = str(doctor(FiniteLP(l1=5.0).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert))
+    assert text.startswith("1 finding. Examined: 24 states of 4 actions each, gamma 0.9.\n1. The reward is zero")
+    assert '\n   Mend: l1="auto"' in text
+
+
+def test_a_healthy_diagnosis_says_what_was_examined():
+    text = str(doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert))
+    assert text.startswith("Healthy. Examined: 24 states") and "in 24 of 24" in text
+
+
+def test_a_diagnosis_is_json():
+    made = doctor(judged(GRID.mdp, GRID.expert, -GRID.R), GRID.mdp, GRID.expert).to_json()
+    assert json.loads(json.dumps(made, allow_nan=False)) == made and made["findings"][0]["states"]
+
+
+def test_long_lists_of_states_are_cut_and_counted():
+    made = doctor(judged(GRID.mdp, GRID.expert, -GRID.R), GRID.mdp, GRID.expert)
+    assert " more" in made.findings[0].sentence
+
+
+def test_every_check_has_its_own_words():
+    assert len({check.__doc__ for check in CHECKS}) == len(CHECKS) and all(check.__doc__ for check in CHECKS)
+
+
+def test_a_finding_of_the_whole_table_names_no_state():
+    assert Finding("name", "This.", "That.").states.size == 0 and Diagnosis((), "").healthy
+
+
+@pytest.mark.parametrize("wrong", [1, np.ones(25), "reward"])
+def test_something_else_than_a_result_is_refused(unchecked, wrong):
+    with pytest.raises(InvalidParameter, match="expected an IRLResult"):
+        doctor(wrong, GRID.mdp, GRID.expert)
+
+
+def test_something_else_than_a_table_is_refused(unchecked):
+    with pytest.raises(InvalidMDP, match="tabulate"):
+        doctor(None, gym.make("FrozenLake-v1"), GRID.expert)
+
+
+def test_neither_a_result_nor_a_table_is_refused():
+    with pytest.raises(InvalidParameter, match="expected a result, a table, or both"):
+        doctor(None, None, None)
+
+
+def test_a_true_reward_of_another_table_is_refused():
+    with pytest.raises(InvalidReward, match="another table"):
+        doctor(None, GRID.mdp, GRID.expert, true=np.ones(3))

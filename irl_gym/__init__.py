@@ -8,6 +8,7 @@
     FeatureLP(phi).fit(mdp, expert)           the same as a LinearReward, alpha . phi, for large state spaces
     TrajectoryLP(phi).fit(Simulator(env, planner, gamma), episodes)     from the expert's episodes alone
     worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns
+    doctor(result, mdp, expert)               why a reward came out zero, flat or useless, in sentences, each with a mend
     LearnedReward(env, reward)                the environment, paying the learned reward
     TabularEnv, TabularVecEnv                 a table as an environment, or as thousands of copies for Stable-Baselines3
     SB3("PPO").plan(env, gamma=...)           an agent trained on it; ValueIteration().plan(...) plans exactly

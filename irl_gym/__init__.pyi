@@ -3,6 +3,7 @@ from .datasets import read_minari as read_minari
 from .datasets import write_minari as write_minari
 from .demonstrations import collect as collect
 from .demonstrations import empirical_policy as empirical_policy
+from .diagnosis import doctor as doctor
 from .discretize import discretize as discretize
 from .dynamic_programming import evaluate_policy as evaluate_policy
 from .dynamic_programming import policy_iteration as policy_iteration
@@ -25,5 +26,4 @@ from .simulator import Simulator as Simulator
 from .tabular_env import TabularEnv as TabularEnv
 from .tabular_vec_env import TabularVecEnv as TabularVecEnv
 from .tabulate import tabulate as tabulate
-from .tabulation import Tabulation as Tabulation
 from .wrappers import LearnedReward as LearnedReward

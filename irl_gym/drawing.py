@@ -4,7 +4,7 @@ Colours are Okabe & Ito's. A cell that no episode visits is slate; letters are t
 Axes: S states, A actions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ MOST_NUMBERS = 144
 """Maps of at most this many cells carry numbers."""
 MOST_ARROWS = 45
 """Arrows a side; on larger maps every second, third, ... row and column has them."""
+MOST_NAMED = 10
+"""Entries at each end of a list that are named."""
 LEAST_SHARE = 0.5
 """Actions less likely than this share of the most likely one have no arrow."""
 BLUE, ORANGE, GREEN, GREY, INK = "#0072b2", "#d55e00", "#009e73", "#7d838d", "#22262e"
@@ -51,11 +53,25 @@ def panels(layout: GridLayout | None) -> tuple[Figure, Sequence[Axes]]:
     return figure, tuple(figure.subplots(1, 2))
 
 
-def footnote(figure: Figure, layout: GridLayout, *, shaded: str = "", policies: bool = False) -> None:
+def paired_panels() -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
+    """Two low panels side by side, and two high ones below them."""
+    figure = blank(13, 8.2)
+    above, below = figure.subplots(2, 2, height_ratios=(3, 5))
+    return figure, tuple(above), tuple(below)
+
+
+def small_titles(figure: Figure) -> None:
+    """Titles that fit above panels with long names at their left."""
+    for axis in figure.axes:
+        axis.set_title(axis.get_title(), fontsize=10)
+
+
+def footnote(figure: Figure, layout: GridLayout, *, shaded: str = "", blank: str = "", policies: bool = False) -> None:
     """Say below the panels what letters and shades mean."""
     told = [f"{letter} {meaning}" for letter, meaning in MEANINGS.items() if (layout.letters == letter).any()]
     told += ["slate: never visited"] if layout.blocked.any() else []
     told += [f"orange: {shaded}"] if shaded else []
+    told += [f"without an arrow: {blank}"] if blank else []
     every = _stride(layout)
     told += [f"arrows in one of every {every} rows and columns"] if policies and every > 1 else []
     figure.supxlabel("     ".join(told), fontsize=9, color=GREY)
@@ -165,15 +181,34 @@ def sorted_line(axis: Axes, values: np.ndarray) -> None:
     plain(axis)
 
 
-def action_counts(axis: Axes, parts: Mapping[str, np.ndarray]) -> None:
-    """Horizontal bars: in how many states each action is taken; parts (A,) are stacked."""
-    names = [f"action {a}" for a in range(len(next(iter(parts.values()))))]
-    left = np.zeros(len(names))
+def telling(values: np.ndarray, name: Callable[[int], str]) -> list[tuple[str, float]]:
+    """The names and values of the entries that say most: the highest and the lowest, highest first."""
+    order = np.argsort(-values, kind="stable")
+    chosen = order if order.size <= 2 * MOST_NAMED else np.concatenate([order[:MOST_NAMED], order[-MOST_NAMED:]])
+    return [(name(int(i)), float(values[i])) for i in chosen]
+
+
+def named_bars(axis: Axes, entries: Sequence[tuple[str, float]]) -> None:
+    """Horizontal bars with a name each, the first on top; a gap where entries between were left out."""
+    names, values = [name for name, _ in entries], np.array([value for _, value in entries])
+    places = np.arange(len(entries)) + (np.arange(len(entries)) >= MOST_NAMED) * (len(entries) == 2 * MOST_NAMED) * 0.8
+    axis.barh(places, values, color=[BLUE if value >= 0 else ORANGE for value in values], height=0.75)
+    axis.set_yticks(places, names, fontsize=8)
+    axis.axvline(0, color=GREY, linewidth=0.8)
+    axis.invert_yaxis()
+    axis.margins(x=0.02, y=0.01)
+    plain(axis)
+
+
+def action_counts(axis: Axes, parts: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
+    """Horizontal bars: in how many states each action is taken; parts (A,) are stacked, actions have names (A,)."""
+    places, left = np.arange(len(names)), np.zeros(len(names))
     for (name, counts), colour in zip(parts.items(), (BLUE, ORANGE) if len(parts) > 1 else (GREEN,), strict=False):
-        axis.barh(names, counts, left=left, color=colour, label=name, height=0.7)
+        axis.barh(places, counts, left=left, color=colour, label=name, height=0.7)
         left = left + counts
     for a, total in enumerate(left):
         axis.annotate(f"{int(total)}", (total, a), xytext=(4, 0), textcoords="offset points", va="center", color=INK)
+    axis.set_yticks(places, names)
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("states in which the action is taken")

@@ -18,6 +18,7 @@ IrlGymError
 ├── NotEnumerable              a call with random outcomes that cannot be listed one by one
 ├── NotSettable                an environment that cannot be set to a given state
 ├── TableMismatch              `env.step` did what the table says is impossible
+├── UndefinedDistance          a reward that is constant, so that its distance from another is not defined
 ├── DegenerateExpert           equation (4) of Ng & Russell leaves no reward that prefers the expert's actions
 ├── SolverError
 │   ├── SolverTimeout          the time limit was reached before an answer
@@ -27,7 +28,10 @@ IrlGymError
 ├── DatasetExists              a Minari id that is taken
 ├── DatasetMissing (also a FileNotFoundError)  a Minari id that is not there
 ├── NotInstalled (also an ImportError)  an optional package that is asked for and missing
-└── RunConflict                a run folder that holds another run
+├── RunConflict                a run folder that holds another run
+└── UnreadableRun
+    ├── RunIncomplete          a run that was killed before its end, or lost a file
+    └── RunNewer               a run that a newer version wrote
 
 A message reads `what, with the value: what was expected. The mend.`
 """
@@ -105,6 +109,10 @@ class TableMismatch(IrlGymError):
     """`env.step` did what the table says is impossible."""
 
 
+class UndefinedDistance(IrlGymError):
+    """A reward that is constant where rewards are compared, so that its distance from another is not defined."""
+
+
 class DegenerateExpert(IrlGymError):
     """No reward prefers the expert's actions: equation (4) holds only with every margin zero."""
 
@@ -143,3 +151,15 @@ class NotInstalled(IrlGymError, ImportError):
 
 class RunConflict(IrlGymError):
     """A run folder that holds another run."""
+
+
+class UnreadableRun(IrlGymError):
+    """A run folder that cannot be read."""
+
+
+class RunIncomplete(UnreadableRun):
+    """A run folder without a file that a run leaves, or of a run that was killed before its end."""
+
+
+class RunNewer(UnreadableRun):
+    """A run folder that a newer version wrote."""

@@ -3,17 +3,16 @@
 No wall time is in it, so that the same seed gives the same bytes; seconds are in the stages' records.
 """
 
-import csv
-import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from irl_gym import metrics
 from irl_gym._typing import ActionSets
+from irl_gym.curves import Curve, read_curve
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular
+from irl_gym.intervals import mean_interval
 from irl_gym.policies import support
 from irl_gym.worlds import TableWorld
 
@@ -36,7 +35,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         seed = experiment.seed + 1_000_003 * (number + 1)
         episodes = [] if told else world.episodes(policy, experiment.eval_episodes, seed)
         returns = earned[:, 1] if told else np.array([episode.total_reward for episode in episodes])
-        mean, low, high = metrics.mean_interval(returns, rng=np.random.default_rng(experiment.seed))
+        mean, low, high = mean_interval(returns, rng=np.random.default_rng(experiment.seed))
         value = {"expert": expert, "random": random}.get(name)
         value = world.value(policy) if value is None else value
         rows[name] = {
@@ -49,9 +48,10 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
             if isinstance(world, TableWorld) and not told
             else None,
         }
+    curve = learning_curve(loop)
     training = {
         "environment_steps": loop.stage("agent")["environment_steps"],
-        "steps_to_0.9": settled_at(learning_curve(loop), random, expert),
+        "steps_to_0.9": settled_at(np.column_stack([curve.steps, curve.value]), random, expert),
     }
     shown = {"policies": rows, "reward": _reward(loop, random, expert), "training": training}
     return {**shown, "table": _table(world) if isinstance(world, TableWorld) else None, "demonstrations": _recorded(loop)}
@@ -133,32 +133,20 @@ STATE_LISTS = ("inseparable", "marginless", "unconstrained", "unknown", "violate
 """Lists of states in certificates; the metrics count them."""
 
 
-COMPARED = re.compile(r"; [\d,]+ states were met in other inner states and did the same")
-"""In an enumeration's method: how many differs where one was killed and continued, and the metrics must not."""
-
-
 def _table(world: TableWorld) -> dict[str, Any]:
     mdp, evidence = world.table.mdp, world.table.evidence
     return {
         "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "error": evidence.error,
-        "method": COMPARED.sub("", evidence.method),
+        "method": evidence.method,
         "check": None if evidence.check is None else dict(vars(evidence.check)),
     }  # fmt: skip
 
 
-def learning_curve(loop: "Loop") -> np.ndarray:
-    """(n, 2) environment steps and exact true value, as the agent trained."""
-    return loop.folder.load("learning_curve.csv", _read_curve)
-
-
-def _read_curve(path: Path) -> np.ndarray:
-    with path.open(newline="") as file:
-        heading, *lines = csv.reader(file)
-    if heading != ["environment_steps", "true_value"]:
-        raise ValueError(f"its columns are {heading}")
-    return np.array(lines, dtype=np.float64).reshape(-1, 2)
+def learning_curve(loop: "Loop") -> Curve:
+    """What the agent earned under the true reward as it trained."""
+    return loop.folder.load("learning_curve.csv", read_curve)
 
 
 def settled_at(curve: np.ndarray, random: float, expert: float) -> int | None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import gymnasium as gym
 import numpy as np
 
 from irl_gym import plotting
@@ -10,10 +11,11 @@ from irl_gym.cell_maps import draw_actions, draw_planes
 from irl_gym.cells import Cells
 from irl_gym.dynamic_programming import evaluate_policy
 from irl_gym.evaluation import from_data, learning_curve, optimal_set
-from irl_gym.layouts import grid_layout
+from irl_gym.layouts import GridLayout, grid_layout
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import optimal_actions
+from irl_gym.names import Names, action_names, state_name
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.states import StateIndex
@@ -31,19 +33,24 @@ def draw(loop: "Loop", folder: Path) -> None:
     levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
     curve = learning_curve(loop)
     pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else _of_steps(loop, loop.world)
-    if len(curve):  # exact planning has none
+    if curve.steps.size:  # exact planning has none
         pictures["learning_curve.png"] = plotting.draw_learning_curve(
-            {"retrained on the recovered reward": plotting.Curve(curve[:, 0], curve[:, 1])}, **levels
+            {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}, **levels
         )
     for name, figure in pictures.items():
         plotting.save_figure(figure, folder / name)
 
 
+def layout_of(env: gym.Env, world: TableWorld) -> GridLayout | None:
+    """The map, where the table is exact and its rows are the cells; not where only some cells are listed."""
+    exact = world.table.evidence.exact and isinstance(world.table.states, StateIndex)
+    return grid_layout(env, world.table.mdp) if exact else None
+
+
 def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
     table = world.table
     mdp, true, learned = table.mdp, table.reward, world.tabular(loop.learned)
-    numbered = isinstance(table.states, StateIndex)  # row = cell; not where only some cells are listed
-    layout = grid_layout(loop.env, mdp) if table.evidence.exact and numbered else None
+    layout = layout_of(loop.env, world)
     expert, unknown = loop.expert, np.zeros(mdp.n_states, dtype=bool)
     if expert.ndim == 2:  # read from data: where nothing is known, random
         known = ~np.isnan(expert).any(axis=1)
@@ -59,10 +66,11 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
         return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})
     agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
     optimal = optimal_actions(mdp, true) if not from_data(loop) else optimal_set(loop)
+    names = Names(action_names(loop.env), lambda row: state_name(loop.env_id, table.states.decode(row), None))
     return {
-        "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp),
-        "values.png": plotting.draw_values(layout, values[0], values[1], mdp),
-        "policies.png": plotting.draw_policies(layout, taken, agent, optimal, mdp),
+        "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp, names),
+        "values.png": plotting.draw_values(layout, values[0], values[1], mdp, names),
+        "policies.png": plotting.draw_policies(layout, taken, agent, optimal, mdp, names),
     }
 
 

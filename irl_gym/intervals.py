@@ -8,7 +8,7 @@ Axes: N values, T tasks, n seeds.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import trim_mean
@@ -35,6 +35,17 @@ class Interval(NamedTuple):
         return f"{self.estimate:.3f} ({self.low:.3f} to {self.high:.3f})"
 
 
+def checked_rng(rng: Any) -> np.random.Generator:
+    """Return a generator as it is.
+
+    Raises:
+        InvalidParameter: anything else, such as a seed.
+    """
+    if isinstance(rng, np.random.Generator):
+        return rng
+    raise InvalidParameter(f"rng is {rng!r}: expected a generator. Make one of a seed: `np.random.default_rng(0)`.")
+
+
 def interquartile_mean(values: np.ndarray) -> float:
     """The mean of the middle half of all values; a quarter of them, rounded down, is left out at each end."""
     return float(trim_mean(_checked(values).ravel(), 0.25))
@@ -49,7 +60,7 @@ def mean_interval(values: np.ndarray, *, rng: np.random.Generator, resamples: in
         resamples: how many.
 
     Raises:
-        InvalidParameter: no values, values that are not finite, or no resamples.
+        InvalidParameter: no values, values that are not finite, no resamples, or an rng that is none.
     """
     return _bootstrapped(_checked(values).reshape(1, -1), lambda rows: rows.mean(axis=-1), rng, resamples)
 
@@ -63,7 +74,7 @@ def iqm_interval(values: np.ndarray, *, rng: np.random.Generator, resamples: int
         resamples: how many.
 
     Raises:
-        InvalidParameter: no values, values that are not finite, more than two axes, or no resamples.
+        InvalidParameter: no values, values that are not finite, more than two axes, no resamples, or an rng that is none.
     """
     tasks = np.atleast_2d(_checked(values))
     if tasks.ndim != 2:
@@ -76,6 +87,7 @@ def _bootstrapped(
 ) -> Interval:
     """A statistic of all values (T, n), and its quantiles over resamples of seeds within each task."""
     resamples = int(checked_number("resamples", resamples, "a whole number of at least 1", least=1, whole=True))
+    rng = checked_rng(rng)
     drawn = [row[rng.integers(row.size, size=(resamples, row.size))] for row in tasks]
     found = statistic(np.concatenate(drawn, axis=1))
     low, high = np.quantile(found, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])

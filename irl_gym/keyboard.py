@@ -14,29 +14,12 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.errors import InvalidParameter, NotDiscrete
+from irl_gym.names import ACTIONS, of_class
 
 QUIT, AGAIN, HELP = "q", "r", "?"
 NAMED = ("up", "down", "left", "right", "space", "enter", "escape")
 """Keys that are more than a character."""
 _SIGNS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
-
-_UP_RIGHT_DOWN_LEFT = ("up", "right", "down", "left")
-ACTIONS: dict[str, tuple[str, ...]] = {
-    "FrozenLakeEnv": ("left", "down", "right", "up"),
-    "CliffWalkingEnv": _UP_RIGHT_DOWN_LEFT,
-    "TaxiEnv": ("down", "up", "right", "left", "pick up", "drop off"),
-    "BlackjackEnv": ("stick", "hit"),
-    "GridWorldEnv": _UP_RIGHT_DOWN_LEFT,
-    "FourRoomsEnv": _UP_RIGHT_DOWN_LEFT,
-    "ContinuousGridWorldEnv": _UP_RIGHT_DOWN_LEFT,
-    "Gridworld": _UP_RIGHT_DOWN_LEFT,  # gym-classics
-    "CartPoleEnv": ("push left", "push right"),
-    "MountainCarEnv": ("push left", "coast", "push right"),
-    "AcrobotEnv": ("torque -1", "no torque", "torque +1"),
-    "LunarLander": ("no engine", "left engine", "main engine", "right engine"),
-    "MiniGridEnv": ("turn left", "turn right", "forward", "pick up", "drop", "toggle", "done"),
-}
-"""Names of the actions 0, 1, ... of environments, by the class or a base class of theirs."""
 
 KEYS: dict[str, tuple[str, ...]] = {
     "up": ("w", "up"), "left": ("a", "left"), "down": ("s", "down"), "right": ("d", "right"),
@@ -105,16 +88,10 @@ def controls_of(env: gym.Env, overrides: str = "") -> Controls:
     if not isinstance(space, spaces.Discrete):
         raise NotDiscrete(f"the action space is {space}: expected Discrete. Wrap it in Gymnasium's DiscretizeAction.")
     n = int(space.n)
-    known = _of_class(env, ACTIONS, n)
+    known = of_class(env, ACTIONS, n)
     actions = {key: action for action, name in enumerate(known) for key in KEYS.get(name, ())}
     actions |= {str(action): action for action in range(min(n, 10))}
     return Controls(actions | _parsed(overrides, n), known or tuple(map(str, range(n))))
-
-
-def _of_class(env: gym.Env, table: dict[str, tuple[str, ...]], count: int) -> tuple[str, ...]:
-    """The entry of the environment's class or a base class, if it has as many names as there are things to name."""
-    found = (table[kind.__name__] for kind in type(env.unwrapped).__mro__ if kind.__name__ in table)
-    return next((names for names in found if len(names) == count), ())
 
 
 def _parsed(overrides: str, n: int) -> dict[str, int]:
@@ -144,7 +121,7 @@ def described(env: gym.Env, observation: Any) -> str:
         return ""
     if numbers.size > MOST_SHOWN:
         return ""
-    names = _of_class(env, PARTS, numbers.size)
+    names = of_class(env, PARTS, numbers.size)
     if names:
         return ", ".join(f"{name} {number:.4g}" for name, number in zip(names, numbers, strict=True))
     return "observation " + " ".join(f"{number:.4g}" for number in numbers)

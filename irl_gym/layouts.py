@@ -5,6 +5,7 @@ left out (falling off CliffWalking's cliff puts the walker back to the start). S
 slippery actions point where they are meant to. Axes: S states, A actions; the map is (rows, columns).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +42,23 @@ class GridLayout:
     def cells(self, values: np.ndarray) -> np.ndarray:
         """(rows, columns, ...) of values (S, ...); what belongs to terminal copies is left out."""
         return np.asarray(values)[: self.n_cells].reshape(*self.shape, *np.shape(values)[1:])
+
+    def to_json(self) -> dict[str, Any]:
+        """The map as json."""
+        arrays = {name: getattr(self, name).tolist() for name in ("directions", "blocked", "terminal", "letters")}
+        return {"shape": list(self.shape), **arrays}
+
+    @classmethod
+    def from_json(cls, told: Mapping[str, Any]) -> "GridLayout":
+        """The map that `to_json` wrote.
+
+        Raises:
+            ValueError, KeyError, TypeError: it is something else.
+        """
+        rows, columns = (int(n) for n in told["shape"])
+        blocked, terminal = (np.array(told[name], dtype=bool).reshape(rows, columns) for name in ("blocked", "terminal"))
+        letters = np.array(told["letters"], dtype="<U1").reshape(rows, columns)
+        return cls((rows, columns), np.array(told["directions"], dtype=int).reshape(-1, 2), blocked, terminal, letters)
 
 
 def grid_layout(env: gym.Env, table: TransitionTable) -> GridLayout | None:

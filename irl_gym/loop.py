@@ -8,14 +8,16 @@
     agent           a planner that sees only the learned reward, on a table shaped by its expected advantage
     metrics         values under the true reward, exact on tables, and returns of episodes in the environment itself
     figures         rewards, values, policies, learning curve
+    record          films of expert and agent, the map, the figures as csv
+    ambiguity       how far the reward is left open, and what the doctor says of it
+    report          report.html
 The true reward enters the table, the expert and the judging only; the learning curve judges, it does not steer.
 """
 
-import csv
 import os
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -23,8 +25,10 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym import figures
+from irl_gym import figures, final_stages
 from irl_gym.choices import environment_of
+from irl_gym.claims import claim, write_environment, write_version
+from irl_gym.curves import write_curve
 from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
@@ -32,23 +36,22 @@ from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
 from irl_gym.given import FromFile
+from irl_gym.glances import Glances
 from irl_gym.learners.base import IRLResult, Learner
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
+from irl_gym.logs import log_scalars, logged
 from irl_gym.places import place_of
-from irl_gym.planners import Agent, Planner
+from irl_gym.planners import SB3, Agent, Planner
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RunFolder, read_json, write_json
+from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
-from irl_gym.table_files import TABLE, UNDER_WAY, keep_table
+from irl_gym.table_files import keep_table
 from irl_gym.worlds import SteppedWorld, TableWorld
-
-STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
-"""After the table."""
 
 OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
@@ -61,15 +64,23 @@ class Loop:
         experiment: what to do.
         out: the folder.
         on_progress: told how far each stage is.
+        command: the command that reproduces the run; None where it is started from Python.
 
     Raises:
         UnknownEnvironment: no such environment.
         NotTabular, NotDiscrete: no table can be made, and the learner needs one.
         DatasetMismatch: the dataset was recorded in another environment.
         RunConflict: the folder holds another run.
+        RunNewer: the folder holds a run of a newer version.
     """
 
-    def __init__(self, experiment: Experiment, out: str | os.PathLike, on_progress: OnProgress | None = None):
+    def __init__(
+        self,
+        experiment: Experiment,
+        out: str | os.PathLike,
+        on_progress: OnProgress | None = None,
+        command: Sequence[str] | None = None,
+    ):
         self.experiment = experiment
         self.report_progress = on_progress or (lambda stage, share: None)
         self.report_progress("table", 0.0)
@@ -86,6 +97,8 @@ class Loop:
         )
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(path, config)
+        write_version(path, command)
+        write_environment(path, self.env, self.env_id)
         if isinstance(self.world, TableWorld):
             keep_table(self.world.table, path)
         self.report_progress("table", 1.0)
@@ -99,11 +112,19 @@ class Loop:
             "agent": self._make_agent,
             "metrics": self._make_metrics,
             "figures": self._make_figures,
+            "record": lambda folder: final_stages.record(self, folder),
+            "ambiguity": lambda folder: final_stages.ambiguity(self, folder),
+            "report": lambda folder: final_stages.report(self, folder),
         }
         self.report_progress(name, 0.0)
         record = self.folder.run(name, makers[name])
         self.report_progress(name, 1.0)
         return record
+
+    @property
+    def env_id(self) -> str | None:
+        """Of the environment."""
+        return self.experiment.env_id or (None if self.env.spec is None else self.env.spec.id)
 
     # Results of finished stages, read from the folder: so a run that continues sees what one in a single go sees.
 
@@ -120,6 +141,11 @@ class Loop:
         if not self.experiment.from_episodes or not isinstance(self.world, TableWorld):
             return None
         return empirical_policy(self.demonstrations, self.world.table.states, self.world.table.mdp.n_actions)
+
+    @property
+    def known_expert(self) -> Any:
+        """What a learner of tables is given of the expert: its policy, or the most frequent actions, NaN where not seen."""
+        return self.expert if self.seen is None else most_frequent(self.seen)
 
     @cached_property
     def agent(self) -> Any:
@@ -156,7 +182,7 @@ class Loop:
     def _make_expert(self, folder: Path) -> dict[str, Any]:
         if self.experiment.dataset is None:
             planner = self.experiment.expert or self.world.expert()
-            policy = self.world.train(planner, None, self._share("expert", planner))
+            policy = self.world.train(logged(planner, folder / LOGS / "expert"), None, self._share("expert", planner))
             self.world.keep(policy, folder, "expert", self.experiment.epsilon)
             made = {"environment_steps": 0} if isinstance(planner, FromFile) else _steps(policy)
             return {"planner": type(planner).__name__, **made}
@@ -206,12 +232,11 @@ class Loop:
             return replace(result, stats={**result.stats, "inner": type(solver).__name__})
         if not isinstance(world, TableWorld):
             raise NotTabular(f"{self.env} has no table: expected one for {type(learner).__name__}. Use TrajectoryLP.")
-        expert = self.expert if self.seen is None else most_frequent(self.seen)
         if isinstance(learner, FeatureLP):
-            return learner.fit(world.table.mdp, expert, states=world.table.states)
+            return learner.fit(world.table.mdp, self.known_expert, states=world.table.states)
         if isinstance(learner, FiniteLP) and self.seen is not None:
-            return learner.fit(world.table.mdp, expert, visits=visits(self.seen))
-        return learner.fit(world.table.mdp, expert)
+            return learner.fit(world.table.mdp, self.known_expert, visits=visits(self.seen))
+        return learner.fit(world.table.mdp, self.known_expert)
 
     @property
     def shaped(self) -> bool:
@@ -230,17 +255,14 @@ class Loop:
         if isinstance(world, TableWorld):
             plain = world.tabular(reward)
             reward = self.transform(plain, world.table.mdp).apply(plain, world.table.mdp)
-        share = self._share("agent", planner)
-        curve: list[tuple[int, float]] = []
-
-        def watch(steps: int, policy: Policy) -> None:
-            share(steps, policy)
-            curve.append((steps, world.glance(policy)))
-
-        policy = world.train(planner, reward, watch)
+        glances = Glances(world, self._share("agent", planner))
+        log = folder / LOGS / "retrained"
+        policy = world.train(logged(planner, log), reward, glances.see)
         world.keep(policy, folder, "agent")
-        with (folder / "learning_curve.csv").open("w", newline="") as file:
-            csv.writer(file).writerows([("environment_steps", "true_value"), *curve])
+        curve = glances.curve()
+        write_curve(curve, folder / "learning_curve.csv")
+        if isinstance(planner, SB3):
+            log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
         return {"planner": type(planner).__name__, **_steps(policy)}
 
     def _make_metrics(self, folder: Path) -> dict[str, Any]:
@@ -253,22 +275,6 @@ class Loop:
         made.mkdir()
         figures.draw(self, made)
         return {}
-
-
-def claim(path: Path, config: dict[str, Any]) -> None:
-    """Refuse a folder of another run before any work, but take over one in which no stage was finished, without its table.
-
-    Raises:
-        RunConflict: it holds another run, or files that are no run at all.
-    """
-    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
-        return
-    known = path / "config.json"
-    before = known.read_bytes() if known.exists() else None
-    RunFolder(path, config)
-    if before not in (None, known.read_bytes()):
-        for name in (TABLE, UNDER_WAY):
-            (path / name).unlink(missing_ok=True)
 
 
 def _steps(policy: Policy) -> dict[str, int]:

@@ -1,13 +1,17 @@
 """The closed loop in one call: environment -> expert -> Minari -> LP-IRL -> reward -> SB3 -> how good it is."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
+
+from irl_gym.claims import STAGES
 from irl_gym.experiment import Experiment
-from irl_gym.loop import STAGES, Loop, OnProgress
+from irl_gym.loop import Loop, OnProgress
+from irl_gym.reveal import Reveal
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,19 +26,43 @@ class Report:
     """The content of certificate.json."""
     stages: Mapping[str, Mapping[str, Any]]
     """The record of each stage: wall seconds in the run that finished it, environment steps, what the solver did."""
+    config: Mapping[str, Any]
+    """The content of config.json: the experiment."""
+    shown: Mapping[str, int]
+    """Hidden integers that the observation was made to show, with their numbers of values."""
+
+    @property
+    def page(self) -> Path:
+        """The page that shows it all."""
+        return self.out / "report.html"
 
 
-def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progress: OnProgress | None = None) -> Report:
+def recover_and_retrain(
+    experiment: Experiment,
+    out: str | os.PathLike,
+    on_progress: OnProgress | None = None,
+    command: Sequence[str] | None = None,
+) -> Report:
     """Recover a reward from an expert, retrain an agent on it, and judge the agent under the true reward.
 
-    Leaves under `out`: config.json, expert.npz, dataset/ (Minari), reward.npz, certificate.json, agent.zip,
-    agent_policy.npz, learning_curve.csv, metrics.json, figures/. Where there is no table the expert is an expert.zip and there
-    is no agent_policy.npz; a dataset that was given is not copied. A run that was killed continues after its last stage.
+    Leaves under `out`:
+        config.json, run.json, environment.json       what was asked, who wrote it, where it took place
+        table.npz, expert.npz, dataset/ (Minari)      expert.zip where there is no table; a dataset given is not copied
+        reward.npz, certificate.json                  what was learned
+        agent.zip, agent_policy.npz                   who was retrained
+        learning_curve.csv, tensorboard/              how
+        metrics.json, metrics.csv, figures/           how good it is
+        films/, grid.json                             episodes to watch; the map of a grid
+        diagnosis.json, ambiguity.npz                 what the doctor says; for small tables, how far the reward is left open
+        report.html                                   all of it, on a page
+    The same seed leaves the same bytes, but for agent.zip and tensorboard/, which hold the time. A run that was killed goes on
+    after its last stage.
 
     Args:
         experiment: what to do.
         out: a new or empty folder, or one that holds this same experiment.
         on_progress: called with a stage and the share of it that is done.
+        command: the command that reproduces the run, kept in run.json; None where it is started from Python.
 
     Raises:
         UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made, and the learner needs one.
@@ -42,7 +70,17 @@ def recover_and_retrain(experiment: Experiment, out: str | os.PathLike, on_progr
         DegenerateExpert: no reward prefers the expert's actions.
         SolverTimeout, SolverFailed: a linear program without an answer.
         RunConflict: the folder holds another run.
+        RunNewer: the folder holds a run of a newer version.
     """
-    loop = Loop(experiment, out, on_progress)
+    loop = Loop(experiment, out, on_progress, command)
     stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-    return Report(loop.folder.path, loop.folder_metrics, loop.certificate, stages)
+    return Report(loop.folder.path, loop.folder_metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
+
+
+def _shown(env: gym.Env) -> Mapping[str, int]:
+    """What wrappers show of the state that the environment hides."""
+    shown: dict[str, int] = {}
+    while isinstance(env, gym.Wrapper):
+        shown |= env.shown if isinstance(env, Reveal) else {}
+        env = env.env
+    return shown

@@ -21,6 +21,7 @@ from gymnasium import spaces
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym._typing import Actions
@@ -180,7 +181,14 @@ class SB3:
             checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
 
     def plan(
-        self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0
+        self,
+        env: gym.Env | VecEnv,
+        *,
+        gamma: float,
+        seed: int = 0,
+        progress: Progress | None = None,
+        interval: int = 0,
+        log: Path | None = None,
     ) -> Agent:
         """Train a new agent.
 
@@ -190,13 +198,18 @@ class SB3:
             seed: of the agent and, through it, of the environment.
             progress: called about every `interval` environment steps, and at the end.
             interval: environment steps between calls; 0 for a hundredth of the total.
+            log: folder for SB3's own scalars, as TensorBoard reads them; None for no log.
         """
         settings = self._settings(env)
         with _torch_threads(self.threads):
             model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
             agent = Agent(model, env.states if isinstance(env, TabularVecEnv) and env.shows_rows else None)
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
+            if log is not None:
+                model.set_logger(configure(str(log), ["tensorboard"]))
             model.learn(self.total_timesteps, callback=callback)
+            if log is not None:
+                model.logger.close()
         if progress:
             progress(model.num_timesteps, agent)
         return agent

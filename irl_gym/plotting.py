@@ -25,6 +25,7 @@ from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.errors import InvalidParameter
 from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TransitionTable
+from irl_gym.names import Names
 from irl_gym.rewards import TabularReward
 
 
@@ -42,24 +43,35 @@ class Curve:
     """(N,) its upper end."""
 
 
-def draw_rewards(layout: GridLayout | None, true: Vector | Matrix, learned: Vector | Matrix, table: TransitionTable) -> Figure:
+def draw_rewards(
+    layout: GridLayout | None,
+    true: Vector | Matrix,
+    learned: Vector | Matrix,
+    table: TransitionTable,
+    names: Names | None = None,
+) -> Figure:
     """The environment's reward beside the learned one, each on its own scale.
 
-    A reward on states is what arrival pays. One on steps (S, A) is drawn like that too when some reward on states
-    explains it (FrozenLake's); else each cell of a map is cut into one triangle a move.
+    On a map a reward on states is what arrival pays. One on steps (S, A) is drawn like that too when some reward on states
+    explains it (FrozenLake's); else each cell is cut into one triangle a move. Where there is no map all states or steps are
+    sorted, and those that are paid most and least are named.
 
     Args:
         layout: the map, or None for an environment that has none.
         true: (S,) paid on arrival, or (S, A) of steps.
         learned: (S,) paid on arrival, or (S, A) of steps.
         table: S states, A actions.
+        names: of states and actions; None for numbers.
     """
+    if layout is None:
+        figure, above, below = drawing.paired_panels()
+        for sorted_, named, name, R in zip(above, below, ("True reward", "Learned reward"), (true, learned), strict=True):
+            _draw_sorted_reward(sorted_, named, name, R, table, names or Names.numbered(table.n_actions))
+        drawing.small_titles(figure)
+        return figure
     figure, axes = drawing.panels(layout)
     for axis, name, R in ((axes[0], "True reward", true), (axes[1], "Learned reward", learned)):
         on_states = R if R.ndim == 1 else arrival_reward(R, table)
-        if layout is None:
-            _draw_sorted_reward(axis, name, R if on_states is None else on_states, table)
-            continue
         if on_states is None:
             told = drawing.triangles(axis, layout, R)
         else:
@@ -67,12 +79,17 @@ def draw_rewards(layout: GridLayout | None, true: Vector | Matrix, learned: Vect
             drawing.cells(axis, layout, on_states, cmap="RdBu", norm=norm, label="reward on arrival")
             told = "paid on arrival in a cell"
         axis.set_title(f"{name}, {told}")
-    if layout is not None:
-        drawing.footnote(figure, layout)
+    drawing.footnote(figure, layout)
     return figure
 
 
-def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: Vector, table: TransitionTable) -> Figure:
+def draw_values(
+    layout: GridLayout | None,
+    true_values: Vector,
+    learned_values: Vector,
+    table: TransitionTable,
+    names: Names | None = None,
+) -> Figure:
     """The expert's discounted value under the true reward beside that under the learned reward.
 
     Args:
@@ -80,19 +97,27 @@ def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: 
         true_values: (S,) expected discounted sum of true rewards from each state; NaN where the expert is not known.
         learned_values: (S,) the same with the learned reward; its unit is the learned reward's.
         table: S states.
+        names: of states; None for numbers.
     """
-    figure, axes = drawing.panels(layout)
     judged = table.reachable & ~table.terminal & np.isfinite(true_values)
     if layout is None:
+        figure, axes, below = drawing.paired_panels()
         drawing.sorted_line(axes[0], true_values[judged])
         axes[0].set(title="Expert's value under the true reward", xlabel="states, best first", ylabel="discounted value")
+        rows, called = np.flatnonzero(judged), names or Names.numbered(table.n_actions)
+        for axis, kind, V in ((below[0], "true", true_values), (below[1], "learned", learned_values)):
+            entries = drawing.telling(V[judged], lambda i: called.state(int(rows[i])))
+            drawing.named_bars(axis, entries)
+            axis.set(title=_of_all(f"Value, {kind} reward", len(entries), rows.size, "states"), xlabel="discounted value")
         axes[1].scatter(true_values[judged], learned_values[judged], s=14, color=drawing.BLUE, alpha=0.55, linewidths=0)
         axes[1].set(
             title="The same states under the learned reward",
             xlabel="expert's value, true reward", ylabel="expert's value, learned reward",
         )  # fmt: skip
         drawing.plain(axes[1])
+        drawing.small_titles(figure)
         return figure
+    figure, axes = drawing.panels(layout)
     seen = "" if np.isfinite(true_values[table.reachable & ~table.terminal]).all() else ", where it was seen"
     titles = (f"Expert's value, true reward{seen}", f"Expert's value, learned reward{seen}")
     for axis, title, V in zip(axes, titles, (true_values, learned_values), strict=True):
@@ -104,37 +129,47 @@ def draw_values(layout: GridLayout | None, true_values: Vector, learned_values: 
 
 
 def draw_policies(
-    layout: GridLayout | None, expert: ActionSets, retrained: Matrix, optimal: ActionSets, table: TransitionTable
+    layout: GridLayout | None,
+    expert: ActionSets,
+    retrained: Matrix,
+    optimal: ActionSets,
+    table: TransitionTable,
+    names: Names | None = None,
 ) -> Figure:
     """The expert's actions beside the retrained agent's; where the agent's is not optimal the cell is shaded.
 
     Args:
         layout: the map, or None for an environment that has none.
-        expert: (S, A) the actions the expert takes.
+        expert: (S, A) the actions the expert takes; none in states where it was not seen.
         retrained: (S, A) the agent's action probabilities; its most probable action is judged.
         optimal: (S, A) all actions that are optimal under the true reward.
         table: S states, A actions.
+        names: of actions; None for numbers.
     """
     figure, axes = drawing.panels(layout)
     judged = table.reachable & ~table.terminal
+    unseen = judged & ~expert.any(axis=1)
+    where = f", seen in {int((judged & ~unseen).sum())} of {int(judged.sum())} states" if unseen.any() else ""
     taken = retrained.argmax(axis=1)
     wrong = judged & ~optimal[np.arange(table.n_states), taken]
     told = f"{int((judged & ~wrong).sum())} of {int(judged.sum())} states"
     if layout is None:
         right, chosen = judged & ~wrong, np.eye(table.n_actions, dtype=bool)[taken]
-        drawing.action_counts(axes[0], {"expert": (expert & judged[:, None]).sum(axis=0)})
+        called = (names or Names.numbered(table.n_actions)).actions
+        drawing.action_counts(axes[0], {"expert": (expert & judged[:, None]).sum(axis=0)}, called)
         parts = {"optimal": (chosen & right[:, None]).sum(axis=0), "not optimal": (chosen & wrong[:, None]).sum(axis=0)}
-        drawing.action_counts(axes[1], parts)
+        drawing.action_counts(axes[1], parts, called)
         several = (expert[judged].sum(axis=1) > 1).any()
-        axes[0].set_title("Expert" + (": every action of its set" if several else ""))
+        axes[0].set_title(f"Expert{where}" + (": every action of its set" if several else ""))
         axes[1].set_title(f"Retrained agent, optimal in {told}")
         axes[1].sharex(axes[0])
         return figure
     drawing.arrows(axes[0], layout, expert.astype(float), judged, np.zeros_like(judged))
-    axes[0].set_title("Expert")
+    axes[0].set_title(f"Expert{where}")
     drawing.arrows(axes[1], layout, retrained, judged, wrong)
     axes[1].set_title(f"Retrained agent, optimal in {told}")
-    drawing.footnote(figure, layout, shaded="not optimal" if wrong.any() else "", policies=True)
+    shaded, blank = "not optimal" if wrong.any() else "", "the expert was not seen there" if unseen.any() else ""
+    drawing.footnote(figure, layout, shaded=shaded, blank=blank, policies=True)
     return figure
 
 
@@ -234,11 +269,27 @@ def arrival_reward(R: Matrix, table: TransitionTable) -> Vector | None:
     return found if np.abs(explained - wanted).max(initial=0) <= 1e-6 * np.abs(wanted).max(initial=0) else None
 
 
-def _draw_sorted_reward(axis: Axes, name: str, R: np.ndarray, table: TransitionTable) -> None:
-    """A reward where there is no map: every state or step, best first."""
+def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, table: TransitionTable, names: Names) -> None:
+    """A reward where there is no map: every state or step, best first; and below it the first and the last by name."""
     if R.ndim == 1:
-        values, what, told = R[table.reachable], "states", "paid on arrival in a state"
+        where, what, told = np.flatnonzero(table.reachable)[:, None], "states", "paid on arrival in a state"
     else:
-        values, what, told = R[table.reachable & ~table.terminal].ravel(), "steps (s, a)", "paid for a step"
-    drawing.sorted_line(axis, values)
-    axis.set(title=f"{name}, {told}", xlabel=f"{values.size:,} {what}, best first", ylabel="reward")
+        acting = np.flatnonzero(table.reachable & ~table.terminal)
+        pairs = np.meshgrid(acting, np.arange(table.n_actions), indexing="ij")
+        where, what, told = np.stack(pairs, axis=-1).reshape(-1, 2), "steps (s, a)", "expected for a step"
+    values = R[tuple(where.T)]
+    drawing.sorted_line(sorted_, values)
+    sorted_.set(title=f"{name}, {told}", xlabel=f"{values.size:,} {what}, best first", ylabel="reward")
+
+    def called(i: int) -> str:
+        state, *action = where[i].tolist()
+        return names.state(state) + "".join(f": {names.actions[a]}" for a in action)
+
+    entries = drawing.telling(values, called)
+    drawing.named_bars(named, entries)
+    named.set(title=_of_all(name, len(entries), values.size, what), xlabel="reward")
+
+
+def _of_all(name: str, shown: int, n: int, what: str) -> str:
+    """A title that says how many of all are named."""
+    return f"{name}: all {n} {what}" if shown == n else f"{name}: highest and lowest {shown // 2} of {n:,} {what}"

@@ -24,10 +24,26 @@ def print_report(report: Report, console: Console) -> None:
 
 def render(report: Report) -> Iterator[RenderableType]:
     """The parts of the report, in reading order."""
+    yield _asked(report)
     yield _policies(report)
     yield _reward(report)
     yield _stages(report)
-    yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics and figures."
+    yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics, figures and films."
+    yield f"Open {report.page} in a browser."
+
+
+def _asked(report: Report) -> str:
+    """Where and with which discount it was done, and what the environment was made to do."""
+    config = report.config
+    made = ", ".join(f"{name}={value}" for name, value in config["env_kwargs"].items())
+    where = config["env_id"] or f"the environment of {config['dataset']}"
+    told = [f"{where} ({made})" if made else where, f"gamma {config['gamma']:g}", f"seed {config['seed']}"]
+    if config["start_seeds"]:
+        told.append(f"layouts from the seeds {', '.join(map(str, config['start_seeds']))}")
+    if report.shown:
+        hidden = ", ".join(f"{name} ({n} values)" for name, n in report.shown.items())
+        told.append(f"shown beside the observation, since the environment hides it: {hidden}")
+    return "; ".join(told) + "."
 
 
 def _policies(report: Report) -> Table:

@@ -22,7 +22,12 @@ try:
 except ModuleNotFoundError:  # not on Windows; there two processes in one folder are not kept apart
     fcntl = None
 
-_RECORDS = ".stages"
+RECORDS = ".stages"
+"""Where the records of finished stages are, in the folder of a run."""
+
+LOGS = "tensorboard"
+"""A folder that several stages write into. No record lists its files, which hold the time and the host's name: who deletes
+them loses no result, and no stage is run again."""
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -83,7 +88,7 @@ class RunFolder:
             found = {}
         before, now = dict(_leaves(found)), dict(_leaves(wanted))
         changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
-        if before and changed and not any((self.path / _RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
+        if before and changed and not any((self.path / RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
             with self._alone():
                 write_json(known, wanted)
             return
@@ -95,7 +100,7 @@ class RunFolder:
             )
 
     def _record(self, stage: str) -> Path:
-        return self.path / _RECORDS / f"{stage}.json"
+        return self.path / RECORDS / f"{stage}.json"
 
     def done(self, stage: str) -> bool:
         """Was this stage finished, now or in an earlier run, and are its files still there?"""
@@ -164,16 +169,25 @@ class RunFolder:
         beside.mkdir()
         start = time.perf_counter()
         record = {**make(beside), "seconds": time.perf_counter() - start}
-        record["files"] = sorted(one.relative_to(beside).as_posix() for one in beside.rglob("*") if one.is_file())
-        for made in sorted(beside.iterdir()):
-            final = self.path / made.name
-            if final.is_dir():
-                shutil.rmtree(final)
-            made.replace(final)
-        beside.rmdir()
+        made = [one.relative_to(beside) for one in beside.rglob("*") if one.is_file()]
+        record["files"] = sorted(one.as_posix() for one in made if one.parts[0] != LOGS)
+        _move(beside, self.path)
         self._record(stage).parent.mkdir(exist_ok=True)
         write_json(self._record(stage), record)
         return record
+
+
+def _move(beside: Path, final: Path) -> None:
+    """Move what is in a folder into another, in place of what has the same name there; the folder of logs is added to."""
+    for made in sorted(beside.iterdir()):
+        there = final / made.name
+        if made.name == LOGS and there.is_dir():
+            _move(made, there)
+            continue
+        if there.is_dir():
+            shutil.rmtree(there)
+        made.replace(there)
+    beside.rmdir()
 
 
 def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -7,6 +7,7 @@ For example:
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from irl_gym import IrlGymError, recover_and_retrain
-from irl_gym.arguments import Arguments
+from irl_gym.arguments import OPTIONS, Arguments
 from irl_gym.report import print_report
 
 
-def main(arguments: Arguments) -> int:
-    """Run the loop and print the report."""
+def main(arguments: Arguments, command: Sequence[str]) -> int:
+    """Run the loop and print the report; the command is kept, so that the run can be had again."""
     console = Console()
     bar = Progress(
         TextColumn("{task.description:14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
@@ -37,7 +38,7 @@ def main(arguments: Arguments) -> int:
     try:
         with bar:
             asked = arguments.experiment()
-            report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show)
+            report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show, command)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
         return 130
@@ -50,4 +51,5 @@ def main(arguments: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
+    sys.exit(main(asked, ["python", "scripts/recover_and_retrain.py", *sys.argv[1:]]))

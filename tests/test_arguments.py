@@ -1,6 +1,7 @@
 """Each argument of the command line reaches the experiment that it stands for."""
 
 import hashlib
+from dataclasses import fields, is_dataclass
 
 import gymnasium as gym
 import numpy as np
@@ -23,7 +24,13 @@ CAR = {"env_id": "MountainCar-v0"}
 
 
 def asked(**arguments):
-    return Arguments(**arguments).experiment()
+    """The experiment of arguments without their groups."""
+    groups = {field.name: field.type for field in fields(Arguments) if is_dataclass(field.type)}
+    grouped = {
+        name: group(**{one.name: arguments.pop(one.name) for one in fields(group) if one.name in arguments})
+        for name, group in groups.items()
+    }
+    return Arguments(**grouped, **arguments).experiment()
 
 
 def learner(**arguments):

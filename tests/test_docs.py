@@ -18,8 +18,8 @@ from typing import NamedTuple
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("wrap-any-environment", "bring-your-own-demonstrations")
-SCRIPTS = ("recover_and_retrain.py", "export_dataset.py", "play.py")
+PAGES = ("wrap-any-environment", "bring-your-own-demonstrations", "reward-distances", "ambiguity", "doctor")
+SCRIPTS = ("recover_and_retrain.py", "export_dataset.py", "play.py", "reward_distances.py", "measure_ambiguity.py", "doctor.py")
 HELP = """
 import contextlib, runpy, sys
 for script in sys.argv[1:]:

@@ -66,3 +66,10 @@ def test_an_interval_refuses_values_that_it_cannot_resample(values, told):
 def test_an_interval_refuses_no_resamples():
     with pytest.raises(InvalidParameter, match="resamples is 0"):
         mean_interval(np.ones(3), rng=np.random.default_rng(0), resamples=0)
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.parametrize("rng", [0, None, np.random.RandomState(0)])
+def test_an_interval_refuses_a_seed_for_a_generator(rng):
+    with pytest.raises(InvalidParameter, match=r"rng is .*: expected a generator. Make one of a seed: `np.random.default_rng"):
+        mean_interval(np.ones(3), rng=rng)

@@ -107,7 +107,18 @@ def test_another_experiment_in_the_same_folder_is_refused(report):
 def test_progress_reaches_the_end_of_each_stage(tmp_path):
     seen = {}
     recover_and_retrain(small(retrain=ValueIteration()), tmp_path, lambda stage, share: seen.update({stage: share}))
-    assert set(seen) == {"table", "expert", "demonstrations", "reward", "agent", "metrics", "figures"}
+    assert set(seen) == {
+        "table",
+        "expert",
+        "demonstrations",
+        "reward",
+        "agent",
+        "metrics",
+        "figures",
+        "record",
+        "ambiguity",
+        "report",
+    }
     assert set(seen.values()) == {1.0}
 
 

@@ -1,11 +1,12 @@
 """A run's folder: stages are done once, whole or not at all, and another run is refused."""
 
 import json
+import shutil
 
 import pytest
 
 from irl_gym.errors import RunConflict
-from irl_gym.run_folder import RunFolder, read_json
+from irl_gym.run_folder import LOGS, RunFolder, read_json
 
 CONFIG = {"env_id": "A-v0", "seed": 1}
 
@@ -23,6 +24,27 @@ def writing(content):
         return {"content": content}
 
     return make
+
+
+def logging(name):
+    def make(beside):
+        (beside / LOGS / name).mkdir(parents=True)
+        (beside / LOGS / name / "events").write_text(name)
+        return {}
+
+    return make
+
+
+def test_several_stages_log_into_one_folder(folder):
+    for name in ("expert", "agent"):
+        folder.run(name, logging(name))
+    assert {path.parent.name for path in (folder.path / LOGS).rglob("events")} == {"expert", "agent"}
+
+
+def test_a_stage_whose_logs_were_deleted_is_not_run_again(folder):
+    folder.run("agent", logging("agent"))
+    shutil.rmtree(folder.path / LOGS)
+    assert folder.done("agent")
 
 
 def test_a_stages_files_are_in_place_after_it(folder):

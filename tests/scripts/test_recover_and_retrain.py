@@ -42,6 +42,22 @@ def test_the_script_is_quiet_when_not_on_a_terminal(finished):
     assert finished[0].stderr == "" and "\x1b" not in finished[0].stdout
 
 
+def test_the_last_line_names_the_page(finished):
+    said, cwd = "".join(finished[0].stdout.split()), finished[1]
+    (page,) = (cwd / "runs").glob("*/report.html")
+    assert said.endswith(f"Openruns/{page.parent.name}/report.htmlinabrowser.")
+
+
+def test_the_report_begins_with_what_was_asked(finished):
+    assert finished[0].stdout.startswith("FrozenLake-v1 (is_slippery=False); gamma 0.99; seed 0.")
+
+
+def test_a_run_keeps_the_arguments_it_was_given(finished):
+    (kept,) = (finished[1] / "runs").glob("*/run.json")
+    wanted = ["python", "scripts/recover_and_retrain.py", *QUICK, "--env-kwargs", "is_slippery=false"]
+    assert json.loads(kept.read_text())["command"] == wanted
+
+
 def test_each_experiment_gets_a_folder_of_its_own(finished):
     _, cwd = finished
     assert len(list((cwd / "runs").iterdir())) == 1

@@ -1,0 +1,95 @@
+"""A folder is claimed for a run: what identifies the run is compared, and two files say who wrote it and where it takes place.
+
+run.json          the format, the version of irl_gym, and the command: no part of what identifies the run
+environment.json  its id, the observation space and the names of the actions: so that a run can be read where the
+                  environment is not installed
+"""
+
+import importlib.metadata
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from minari.serialization import serialize_space
+
+from irl_gym.errors import RunConflict, RunNewer
+from irl_gym.names import action_names
+from irl_gym.run_folder import RunFolder, read_json, write_json
+from irl_gym.table_files import TABLE, UNDER_WAY
+
+FORMAT = "irl_gym.Run/1"
+FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
+"""Stages of every version, after the table."""
+STAGES = (*FIRST, "record", "ambiguity", "report")
+"""All stages after the table."""
+VERSION, ENVIRONMENT = "run.json", "environment.json"
+
+
+def claim(path: Path, config: dict[str, Any]) -> None:
+    """Refuse a folder of another run before any work, but take over one in which no stage was finished, without its table.
+
+    Raises:
+        RunConflict: it holds another run, or files that are no run at all.
+        RunNewer: it holds a run of a newer version.
+    """
+    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+        return
+    if (path / VERSION).exists():
+        try:
+            told = read_json(path / VERSION)
+        except (OSError, ValueError) as error:
+            raise RunConflict(f"{path / VERSION} cannot be read ({error}): expected a run's. Delete that file.") from error
+        check_format(path, told)
+    known = path / "config.json"
+    before = known.read_bytes() if known.exists() else None
+    RunFolder(path, config)
+    if before not in (None, known.read_bytes()):
+        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT):
+            (path / name).unlink(missing_ok=True)
+
+
+def check_format(path: Path, told: Mapping[str, Any]) -> None:
+    """Check the content of a folder's run.json; empty for a run of a version that wrote none.
+
+    Raises:
+        RunNewer: a newer version wrote it.
+        RunConflict: it is no run's.
+    """
+    found = told.get("format")
+    if not told or found == FORMAT:
+        return
+    number = re.fullmatch(r"irl_gym\.Run/(\d+)", str(found))
+    if number is None:
+        raise RunConflict(f"{path / VERSION} has format {found!r}: expected {FORMAT!r}. Is it another program's?")
+    raise RunNewer(
+        f"{path} has format {found!r}, written by irl_gym {told.get('irl_gym')}: expected {FORMAT!r}, which is what irl_gym "
+        f"{_version()} reads. Upgrade irl_gym."
+    )
+
+
+def write_version(path: Path, command: Sequence[str] | None) -> None:
+    """Write run.json, unless it stands already: a run that continues keeps the command of its start."""
+    if not (path / VERSION).exists():
+        write_json(
+            path / VERSION, {"format": FORMAT, "irl_gym": _version(), "command": None if command is None else [*command]}
+        )
+
+
+def write_environment(path: Path, env: gym.Env, env_id: str | None) -> None:
+    """Write environment.json, unless it stands already."""
+    if not (path / ENVIRONMENT).exists():
+        observations = serialize_space(env.observation_space)  # text, as Minari keeps it: bounds may be infinite
+        told = {"id": env_id, "observations": observations, "actions": [*action_names(env)]}
+        write_json(path / ENVIRONMENT, told)
+
+
+def shell_command(command: Sequence[str] | None) -> str | None:
+    """A command as a shell reads it; None for None."""
+    return None if command is None else shlex.join(command)
+
+
+def _version() -> str:
+    return importlib.metadata.version("irl_gym")

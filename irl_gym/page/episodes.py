@@ -1,0 +1,106 @@
+"""Episodes of the expert and of the retrained agent, as the page plays them.
+
+A moment is shown by its picture where the film has some, by a token on the map where states are cells, else by its row in the
+table of steps. Pictures that would make the page too large are thinned evenly.
+"""
+
+import base64
+from collections.abc import Mapping
+from typing import Any
+
+from irl_gym.films import Film, Moment
+from irl_gym.page.maps import geometry
+from irl_gym.page.scene import Scene
+from irl_gym.page.sections import Section
+from irl_gym.page.written import counted, sum_of
+from irl_gym.runs import Run
+
+MOST_BYTES = 700_000
+"""Of the pictures of one film."""
+MOST_MOMENTS = 2_000
+TITLES = {"expert": "Expert", "agent": "Retrained agent"}
+ENDS = {
+    "terminated": "The episode ends by itself.",
+    "truncated": "A time limit ends the episode.",
+    "cut": "The film stops before the episode does.",
+}
+
+
+def episodes(run: Run, scene: Scene | None) -> tuple[Section, dict[str, Any]]:
+    """The section, and what its script plays."""
+    films = {name: film for name, film in run.films.items() if film.steps}
+    if not films:
+        return Section("episodes", "Episodes", "No episode of this run was filmed."), {}
+    place = None if scene is None or scene.place is None or scene.place.plane is not None else scene.place
+    players = []
+    for name, film in films.items():
+        pictures, of = _pictures(film)
+        on_map = not pictures and place is not None and all(one.state is not None for one in film.steps)
+        moments = film.steps[:MOST_MOMENTS]
+        players.append(
+            {
+                "name": name,
+                "pictures": pictures,
+                "map": _map(place) if on_map and place is not None else None,
+                "moments": [_moment(one, film, of, place if on_map else None) for one in moments],
+            }
+        )
+    lead = (
+        "One episode of each, from the same kind of start. Play them, or step with the buttons; the slider below each goes to "
+        "any moment."
+    )
+    told = [_told(name, film) for name, film in films.items()]
+    return Section("episodes", "Episodes", lead, (), "episodes", {"players": told}), {"players": players}
+
+
+def _told(name: str, film: Film) -> dict[str, Any]:
+    """The words around a player."""
+    last, steps = film.steps[-1], len(film.steps) - 1
+    title = TITLES.get(name, name)
+    seed = "" if film.seed is None else f" Reset with seed {film.seed}."
+    said = (
+        f"{counted(steps, 'step')}, true return {sum_of(last.true_total)}, return under the learned reward "
+        f"{sum_of(last.learned_total)}. {ENDS.get(film.ends, '')}{seed}"
+    )
+    return {
+        "name": name,
+        "title": title,
+        "said": said,
+        "last": min(len(film.steps), MOST_MOMENTS) - 1,
+        "why": film.without_frames,
+    }
+
+
+def _pictures(film: Film) -> tuple[list[str], int]:
+    """Pictures as data URLs, every first, second, third, ... of them; and that number."""
+    size = sum(map(len, film.frames))
+    every = max(1, -(-size // MOST_BYTES))
+    kept = film.frames[::every]
+    return [f"data:image/{film.kind};base64,{base64.b64encode(one).decode()}" for one in kept], every
+
+
+def _moment(moment: Moment, film: Film, every: int, place: Any) -> dict[str, Any]:
+    """One row of the table of steps, and what is drawn."""
+    told: dict[str, Any] = {
+        "text": moment.text,
+        "action": moment.action_name or "",
+        "pay": "" if moment.true_reward is None else sum_of(moment.true_reward),
+        "learned": "" if moment.learned_reward is None else sum_of(moment.learned_reward, 3),
+        "total": sum_of(moment.true_total),
+        "learnedTotal": sum_of(moment.learned_total, 3),
+    }
+    if film.frames and moment.frame is not None:
+        told["picture"] = moment.frame // every
+    if place is not None and moment.state is not None and moment.state < place.layout.n_cells:
+        told["cell"] = moment.state
+    return told
+
+
+def _map(place: Any) -> Mapping[str, Any]:
+    """The map that a token moves over."""
+    layout = place.layout
+    return {
+        **geometry(place),
+        "blocked": layout.blocked.astype(int).ravel().tolist(),
+        "letters": layout.letters.ravel().tolist(),
+    }

@@ -1,0 +1,141 @@
+"use strict";
+// Draws the figures of the page with Plotly. A colour "var(--name)" is the style sheet's, looked up at each change of colours.
+
+const CONFIG = { displayModeBar: false, displaylogo: false, responsive: false, scrollZoom: false, doubleClick: false };
+const MOST_ROWS = 400;
+const NARROW = 480;
+
+function resolved(value, style) {
+  if (typeof value === "string") {
+    const found = /^var\((--[\w-]+)\)$/.exec(value);
+    return found ? style.getPropertyValue(found[1]).trim() : value;
+  }
+  if (Array.isArray(value)) {
+    const plainNumbers = value.every((one) => typeof one === "number" || one === null);
+    return plainNumbers ? value : value.map((one) => resolved(one, style));
+  }
+  if (value && typeof value === "object") {
+    return Object.fromEntries(Object.entries(value).map(([key, one]) => [key, resolved(one, style)]));
+  }
+  return value;
+}
+
+// An arrow along (down, right) from (row, column): a shaft and a head, in cells. Alone in its cell it stands in the middle.
+function arrow(row, column, down, right, alone, size, x, y) {
+  const length = Math.hypot(down, right);
+  const [dy, dx] = [down / length, right / length];
+  const [from, to] = alone ? [-0.32 * size, 0.34 * size] : [0.06 * size, 0.44 * size];
+  const [shaft, head, back] = [0.035 * size, 0.12 * size, to - 0.19 * size];
+  const corners = [[from, shaft], [back, shaft], [back, head], [to, 0], [back, -head], [back, -shaft], [from, -shaft], [from, shaft]];
+  corners.forEach(([along, across]) => {
+    x.push(column + along * dx - across * dy);
+    y.push(row + along * dy + across * dx);
+  });
+  x.push(null);
+  y.push(null);
+}
+
+// The outlines of all arrows, those of shaded cells apart: {plain: {x, y}, off: {x, y}}.
+function outlines(drawn) {
+  const [rows, columns] = drawn.shape;
+  const made = { plain: { x: [], y: [] }, off: { x: [], y: [] } };
+  for (let row = 0; row < rows; row += drawn.every) {
+    for (let column = 0; column < columns; column += drawn.every) {
+      const cell = row * columns + column;
+      const taken = drawn.directions.map((_, a) => a).filter((a) => (drawn.sets[cell] >> a) & 1);
+      const into = drawn.off[cell] ? made.off : made.plain;
+      taken.forEach((a) => {
+        const [down, right] = drawn.directions[a];
+        if (down || right) arrow(row, column, down, right, taken.length === 1, drawn.every, into.x, into.y);
+      });
+    }
+  }
+  return made;
+}
+
+function heightOf(spec, width) {
+  if (!spec.aspect) return spec.height;
+  const inner = Math.max(width - 90, 120);
+  return Math.round(Math.min(Math.max(inner * spec.aspect, 70), 620) + 46);
+}
+
+function drawFigure(name) {
+  const spec = DATA.figures[name];
+  const box = document.getElementById(name);
+  const figure = resolved({ data: spec.data, layout: spec.layout }, getComputedStyle(document.documentElement));
+  if (spec.arrows) {
+    const { plain, off } = outlines(spec.arrows);
+    Object.assign(figure.data[1], plain);
+    Object.assign(figure.data[2], off);
+  }
+  const width = box.clientWidth;
+  if (width < NARROW) {
+    figure.layout.font = { ...figure.layout.font, size: 11 };
+  }
+  Object.assign(figure.layout, { width, height: heightOf(spec, width), autosize: false });
+  box.style.height = `${figure.layout.height}px`;
+  return Plotly.react(box, figure.data, figure.layout, CONFIG);
+}
+
+function drawAll() {
+  return Promise.all(Object.keys(DATA.figures).map(drawFigure));
+}
+
+let waiting = 0;
+let drawnAt = window.innerWidth;
+window.addEventListener("resize", () => {
+  if (window.innerWidth === drawnAt) return; // a phone's address bar comes and goes
+  drawnAt = window.innerWidth;
+  window.clearTimeout(waiting);
+  waiting = window.setTimeout(drawAll, 150);
+});
+themed.push(drawAll);
+window.drawn = drawAll();
+
+// The numbers behind a figure, as a table that is made when it is opened.
+function cellText(value) {
+  return value === null || value === undefined ? "" : String(value);
+}
+
+function plain(text) {
+  const made = new DOMParser().parseFromString(String(text), "text/html"); // undoes the escapes of plotted text
+  return made.body.textContent;
+}
+
+function rowsOf(spec) {
+  const map = spec.data.find((one) => one.name === "values");
+  if (map) {
+    const at = (axis, i) => (axis ? axis[i] : i);
+    const rows = map.z.flatMap((row, r) => row.map((value, c) => [at(map.y, r), at(map.x, c), value]));
+    return [["row", "column", "value"], rows.filter((one) => one[2] !== null)];
+  }
+  if (spec.arrows) {
+    const columns = spec.arrows.shape[1];
+    const words = (set) => spec.arrows.directions.map((d, a) => [d, a]).filter(([, a]) => (set >> a) & 1).map(([d]) => compass(d));
+    const rows = spec.arrows.sets.map((set, cell) => [Math.floor(cell / columns), cell % columns, words(set).join(", "), spec.arrows.off[cell] ? "deviates" : ""]);
+    return [["row", "column", "actions", ""], rows.filter((one) => one[2])];
+  }
+  const lines = spec.data.filter((one) => one.x && one.hoverinfo !== "skip");
+  const horizontal = lines.some((one) => one.orientation === "h");
+  const rows = lines.flatMap((one) => one.x.map((x, i) => {
+    const name = one.text ? one.text[i] : one.name || "";
+    return (horizontal ? [one.y[i], one.name || "", x] : [name, x, one.y[i]]).map((value) => (typeof value === "string" ? plain(value) : value));
+  }));
+  return [horizontal ? ["name", "of", "value"] : ["of", "x", "y"], rows];
+}
+
+function compass([down, right]) {
+  return [["", "down", "up"].at(down), ["", "right", "left"].at(right)].filter(Boolean).join(" ") || "stay";
+}
+
+document.querySelectorAll("details.numbers").forEach((details) => {
+  details.addEventListener("toggle", () => {
+    if (!details.open) return;
+    const spec = DATA.figures[details.dataset.of];
+    const [headings, rows] = rowsOf(spec);
+    const left = rows.length - MOST_ROWS;
+    const caption = spec.title + (left > 0 ? `; ${left} more rows are left out` : "");
+    const shown = rows.slice(0, MOST_ROWS).map((row) => row.map(cellText));
+    details.querySelector(".scroll").replaceChildren(tableOf(caption, headings, shown));
+  });
+});

@@ -1,0 +1,209 @@
+"""The verdict, the certificate in words, and the doctor's sentences."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from irl_gym.page.sections import Section
+from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
+from irl_gym.runs import Run
+
+GOOD, MUCH = 0.9, 0.05
+"""A score that is good, and a share lost by the worst tie that is much."""
+ROUNDING = 1e-7
+"""A gap to the program's optimum below this share of the objective is none."""
+MOST_STATES = 12
+"""States that a finding lists."""
+
+
+def verdict(run: Run) -> dict[str, Any]:
+    """The sentence at the top and three figures, each with whether it is good."""
+    agent, reward = run.metrics["policies"]["retrained"], run.metrics["reward"]
+    score, share = agent.get("score"), reward.get("worst_tie_regret_share")
+    optimal = bool(reward.get("expert_optimal"))
+    figures = [
+        {
+            "label": "score of the retrained agent",
+            "value": "none" if score is None else number(score, 3),
+            "note": "random actions are 0, the expert is 1"
+            if score is not None
+            else "the expert earns no more than random actions",
+            "mood": "plain" if score is None else "good" if score >= GOOD else "bad",
+        },
+        {
+            "label": "lost by the worst tie",
+            "value": "not known" if share is None else percent(max(share, 0.0)),
+            "note": "of what the expert has over random, by the worst policy that is best under the learned reward",
+            "mood": "plain" if share is None else "good" if share <= MUCH else "bad",
+        },
+        {
+            "label": "expert optimal under the reward",
+            "value": "yes" if optimal else "no",
+            "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
+            "mood": "good" if optimal and not reward.get("degenerate") else "bad",
+        },
+    ]
+    return {"sentence": _sentence(run, score, share, optimal), "figures": figures}
+
+
+def _proved(reward: Mapping[str, Any]) -> str:
+    gap = reward.get("duality_gap")
+    if gap is None:
+        return "recomputed, not taken from the solver"
+    if gap <= ROUNDING * max(1.0, abs(reward.get("objective") or 0.0)):
+        return "and to rounding no reward does better in the program"
+    return f"the program's optimum is at most {number(gap, 2)} away"
+
+
+def _sentence(run: Run, score: float | None, share: float | None, optimal: bool) -> str:
+    agent = run.metrics["policies"]["retrained"]
+    earned = (
+        f"The agent that saw only the recovered reward reaches {percent(score)} of the way from random actions to the expert"
+        if score is not None
+        else f"The agent that saw only the recovered reward has value {number(agent['value'])}; the expert earns no more than "
+        "random actions, so there is no score"
+    )
+    tie = (
+        ""
+        if share is None
+        else f"; the unluckiest policy that is best under that reward would lose {percent(max(share, 0.0))}"
+        if share > 1e-9
+        else "; every policy that is best under that reward is as good as the expert"
+    )
+    certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it everywhere"
+    return f"{earned}{tie}; {certified}."
+
+
+def certificate(run: Run) -> Section:
+    """What the learned reward proves, line by line, and the raw numbers behind it."""
+    raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
+    lead = "Recomputed from the table, the expert and the reward alone; nothing is taken from the solver's word."
+    if run.table is None:
+        lead = "Recomputed from the sampled trajectories and the reward alone; nothing is taken from the solver's word."
+    shown = {"lines": list(_lines(run)), "raw": raw}
+    return Section("certificate", "Certificate", lead, (), "certificate", shown)
+
+
+def _lines(run: Run) -> Iterator[tuple[str, str]]:
+    """Terms and what they are, for whichever learner's certificate it is."""
+    reward, held = run.metrics["reward"], run.certificate
+    yield "Status of the program", str(reward.get("status", "not recorded in this version"))
+    yield "Expert optimal under the reward", "yes" if reward["expert_optimal"] else _why_not(reward)
+    if held.get("degenerate"):
+        yield "Degenerate", "yes: the reward is zero or constant, or ties the expert with every policy found"
+    margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)
+    finite = margin[np.isfinite(margin)]
+    if finite.size:
+        yield "Margins", f"{number(finite.min())} to {number(finite.max())} in {counted(finite.size, 'state')}"
+    cap = held.get("margin_cap")
+    if "margin_cap" in held:
+        yield "Margin cap", "none: Ng & Russell's own program" if cap is None else number(cap)
+    gap = held.get("duality_gap")
+    best = "" if gap is None else f", at most {max(gap, 0.0):.1e} below the best possible"
+    yield "Objective", f"{number(held.get('objective'))}{best}"
+    if "lambda_0" in held:
+        top = held["lambda_0"]
+        zero = "lambda_0 was not computed" if top is None else f"from {number(top)} on the reward is 0"
+        yield "lambda and lambda_0", f"{number(held.get('l1'))}; {zero}"
+    if held.get("least_l1_norm") is not None:
+        yield "||R||_1", f"{number(held.get('l1_norm'))}; the least with these margins is {number(held['least_l1_norm'])}"
+    for key, told in _COUNTS.items():
+        n = reward.get(f"{key}_states")
+        if n:
+            yield told[0], f"{counted(n, 'state')}: {told[1]}"
+    if "distance" in held:
+        yield "Distance to the expert", (
+            f"{number(held['distance'])} in the features; noise alone makes about {number(held.get('distance_error'), 2)}"
+        )  # fmt: skip
+        yield "Planner", "fell short of the expert" if held.get("fell_short") else "as good as the expert under the reward"
+    if "n_features" in held:
+        yield "Features", f"{held['n_features']:,}; the rows have rank {held['rank']:,}"
+    if "worst_tie_regret" in reward:
+        yield "Worst tie", f"loses {sum_of(max(reward['worst_tie_regret'], 0.0))} of value against the expert"
+
+
+_COUNTS = {
+    "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
+    "marginless": ("Without a margin", "the expert is only tied with another action"),
+    "unknown": ("Expert not seen", "nothing is asked of its actions there"),
+    "violated": ("Violated", "another action is better there under the learned reward"),
+    "unconstrained": ("Without a comparison", "all actions do the same there"),
+}
+
+
+def _why_not(reward: Mapping[str, Any]) -> str:
+    worst = reward.get("worst_violation")
+    if worst:
+        n = reward.get("violated_states")
+        where = f" in {counted(n, 'state')}" if n else ""
+        return f"no: another action is better by up to {number(worst, 3)}{where}"
+    if "regret" in reward:
+        return f"no: the policy planned for it gains {number(reward['regret'], 3)} +- {number(reward['regret_error'], 2)}"
+    return "no"
+
+
+def doctor(run: Run) -> Section:
+    """The doctor's findings with their mends."""
+    title = "Doctor"
+    if run.diagnosis is None:
+        why = sentence_of(run.stages.get("ambiguity", {}).get("no_diagnosis"))
+        return Section("doctor", title, f"The doctor did not look at this run. {why}".strip())
+    findings = [_finding(run, one) for one in run.diagnosis.get("findings", ())]
+    lead = "What a careful reader would ask of this reward, and what to do about it."
+    if not findings:
+        lead = "The doctor has nothing to complain about."
+    return Section("doctor", title, lead, (), "doctor", {"findings": findings})
+
+
+def _finding(run: Run, found: Mapping[str, Any]) -> dict[str, Any]:
+    states = list(found.get("states") or ())
+    names = [run.state_name(int(row)) for row in states[:MOST_STATES]] if run.table is not None else []
+    more = f" and {len(states) - MOST_STATES:,} more" if len(states) > MOST_STATES and names else ""
+    return {
+        "name": str(found.get("name", "")).replace("_", " ").replace("-", " "),
+        "sentence": found.get("sentence", ""),
+        "mend": found.get("mend", ""),
+        "states": f"{'; '.join(names)}{more}" if names else "",
+    }
+
+
+def stages(run: Run) -> Section:
+    """How long each stage took. Of these the page of the same run differs from machine to machine, and of nothing else."""
+    rows = []
+    for name, record in run.stages.items():
+        if name == "report":  # it is being written
+            continue
+        steps = record.get("environment_steps", 0)
+        rows.append((name, seconds(record.get("seconds")), f"{steps:,}" if steps else ""))
+    return Section("stages", "Stages", "What was done, and how long it took.", (), "stages", {"rows": rows})
+
+
+def table_facts(run: Run) -> Section:
+    """How big the table is, and how far it is to be trusted."""
+    told = run.metrics.get("table")
+    if told is None:
+        lead = (
+            "There is no table: the environment was stepped, and everything is estimated from episodes. So this page has no "
+            "values, policies, lambda slider and feasible widths state by state."
+        )
+        return Section("table", "The table", lead)
+    lines = [
+        ("States", f"{told['states']:,}, of which episodes visit {told['reachable']:,}"),
+        ("Actions", f"{told['actions']:,}: {', '.join(run.actions[:12])}"),
+        ("Transitions", f"{told['transitions']:,}"),
+    ]
+    if "exact" in told:
+        off = told.get("error")
+        sure = "not exact" if off is None else f"within {number(off, 2)}, with 95 % confidence"
+        lines.append(("Probabilities", "exact" if told["exact"] else sure))
+        lines.append(("Where from", str(told.get("method", ""))))
+    if told.get("split"):
+        lines.append(("Split", f"{counted(told['split'], 'state')} both ordinary and terminal"))
+    check = told.get("check")
+    if check:
+        lines.append(
+            ("Checked", f"{check['steps']:,} steps of the environment, no contradiction; p = {number(check['p_value'], 2)}")
+        )
+    return Section("table", "The table", "What the environment was turned into.", (), "facts", {"lines": lines})

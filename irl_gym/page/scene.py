@@ -1,0 +1,131 @@
+"""What the page needs of a run's table, worked out once: who acts how, what is optimal, and where states lie.
+
+Axes: S states, A actions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
+from irl_gym.dynamic_programming import backup, evaluate_policy, policy_iteration, tied
+from irl_gym.mdp import TabularMDP
+from irl_gym.metrics import TIE_TOLERANCE
+from irl_gym.page.maps import Map
+from irl_gym.policies import as_distribution
+from irl_gym.rewards import TabularReward
+from irl_gym.runs import Run
+from irl_gym.tabulation import Tabulation
+
+LEAST_SHARE = 0.5
+"""Actions less likely than this share of the most likely one are not shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A run with a table."""
+
+    run: Run
+    table: Tabulation
+    learned: TabularReward
+    """The recovered reward on the rows of the table."""
+
+    @classmethod
+    def of(cls, run: Run) -> "Scene | None":
+        """The scene of a run; None where it has no table."""
+        learned = run.tabular
+        return None if run.table is None or learned is None else cls(run, run.table, learned)
+
+    @property
+    def mdp(self) -> TabularMDP:
+        """P, gamma and d0."""
+        return self.table.mdp
+
+    @cached_property
+    def acting(self) -> StateMask:
+        """(S,) states that episodes visit and in which an action is taken."""
+        return self.mdp.reachable & ~self.mdp.terminal
+
+    @cached_property
+    def place(self) -> Map | None:
+        """Where states lie, if on a map."""
+        return Map.of(self.run.grid, self.table.states, self.mdp)
+
+    @cached_property
+    def seen(self) -> StateMask:
+        """(S,) states in which the expert's action is known."""
+        expert = self.run.expert
+        if expert is None or expert.ndim == 1:
+            return np.full(self.mdp.n_states, expert is not None)
+        return np.logical_not(np.isnan(expert).any(axis=1))
+
+    @cached_property
+    def expert(self) -> Matrix:
+        """(S, A) the expert's probabilities; uniform where nothing is known."""
+        policy = self.run.expert
+        if policy is None or policy.ndim == 1:
+            return self._distribution(policy)
+        return self._distribution(np.where(self.seen[:, None], policy, 1 / self.mdp.n_actions))
+
+    @cached_property
+    def agent(self) -> Matrix:
+        """(S, A) the retrained agent's probabilities."""
+        return self._distribution(self.run.agent)
+
+    def _distribution(self, policy: np.ndarray | None) -> np.ndarray:
+        n_states, n_actions = self.mdp.n_states, self.mdp.n_actions
+        return as_distribution(np.full((n_states, n_actions), 1 / n_actions) if policy is None else policy, n_states, n_actions)
+
+    @cached_property
+    def best(self) -> tuple[Vector, Matrix]:
+        """V and Q of the best policy under the true reward: the expert's, where it is that, which costs one evaluation."""
+        reward = self.table.reward.expected(self.mdp)
+        V = evaluate_policy(self.mdp, reward, self.expert)
+        Q = backup(self.mdp, reward, V)
+        if (np.abs(Q.max(axis=1) - V) <= 1e-10 * max(float(np.abs(V).max()), 1e-300)).all():
+            return V, Q
+        solution = policy_iteration(self.mdp, self.table.reward)
+        return solution.V, solution.Q
+
+    @cached_property
+    def optimal(self) -> ActionSets:
+        """(S, A) the actions that are optimal under the true reward."""
+        return tied(self.best[1], TIE_TOLERANCE * float(np.abs(self.table.reward.values).max()))
+
+    @cached_property
+    def deviates(self) -> StateMask:
+        """(S,) states in which the agent's likeliest action is none of the expert's, and not optimal either."""
+        taken = self.agent.argmax(axis=1)
+        rows = np.arange(self.mdp.n_states)
+        fine = (chosen(self.expert) & self.seen[:, None])[rows, taken] | self.optimal[rows, taken]
+        return self.acting & ~fine
+
+    @cached_property
+    def lost(self) -> Vector:
+        """(S,) what the agent's likeliest action loses there, if all later ones are optimal, under the true reward."""
+        V, Q = self.best
+        return np.where(self.acting, V - Q[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)], 0.0)
+
+    def value(self, reward: TabularReward, policy: Matrix) -> Vector:
+        """(S,) a policy's value; NaN in states that are not judged."""
+        return np.where(self.acting, evaluate_policy(self.mdp, reward, policy), np.nan)
+
+    def name(self, row: int) -> str:
+        """What a state is called."""
+        ended = " (ended)" if row in self._copies else ""
+        return self.run.state_name(row) + ended
+
+    @cached_property
+    def _copies(self) -> frozenset[int]:
+        return frozenset(self.table.states.terminal_copies.values())
+
+    def names(self, rows: Sequence[int] | Indices) -> list[str]:
+        """What some states are called."""
+        return [self.name(int(row)) for row in rows]
+
+
+def chosen(policy: Matrix) -> ActionSets:
+    """(S, A) the actions of a policy that are worth showing: those nearly as likely as the likeliest."""
+    return policy >= np.maximum(LEAST_SHARE * policy.max(axis=1, keepdims=True), 1e-12)

@@ -1,0 +1,217 @@
+"""The lambda slider: how reward, policy and margins change with the price of ||R||_1, piece by piece.
+
+The path of the program's optimum is piecewise constant in lambda; each position of the slider is one piece, and a last one
+stands for lambda above lambda_0, where R = 0. Everything is worked out here; the script only shows it.
+Axes: S states, A actions, k pieces.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from irl_gym._typing import ActionSets
+from irl_gym.dynamic_programming import Discounted, backup, tied
+from irl_gym.metrics import TIE_TOLERANCE, optimal_actions
+from irl_gym.page import maps, panels
+from irl_gym.page.panels import Panel, axis, blank, plotted, telling
+from irl_gym.page.scene import Scene
+from irl_gym.page.sections import Section
+from irl_gym.page.written import listed, number, sentence_of
+from irl_gym.rewards import TabularReward
+
+MOST_PIECES = 240
+"""Positions of the slider."""
+MOST_CELLS = 90_000
+"""Pieces times cells of a map that the page holds."""
+BARS = 24
+TITLE = "The price of a large reward"
+NO_PATH = "How the reward changes with lambda, the price of its norm, was not worked out for this run."
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """The pieces that are shown, the last with R = 0."""
+
+    low: np.ndarray
+    """(k,) where each begins."""
+    high: np.ndarray
+    """(k,) where it ends; infinite for the last."""
+    rewards: np.ndarray
+    """(k, S) or (k, S, A)."""
+    margins: np.ndarray
+    """(k, S) NaN where the expert is compared with nothing."""
+    l1_norms: np.ndarray
+    """(k,) ||R||_1."""
+    changes: tuple[str, ...]
+    """(k,) what changes where each begins."""
+    of: int
+    """Pieces of the whole path."""
+
+    @classmethod
+    def of_path(cls, path: Mapping[str, Any], most: int) -> "Pieces":
+        """At most `most` pieces of a path, evenly, with the first and the last."""
+        ends, rewards, margins = (np.asarray(path[name], dtype=float) for name in ("breakpoints", "rewards", "margins"))
+        k = len(rewards)
+        kept = np.unique(np.linspace(0, k - 1, min(k, max(most, 2))).astype(int))
+        following = np.append(kept[1:], k)
+        low, high, norms = ends[kept], ends[following], np.asarray(path["l1_norms"], dtype=float)[kept]
+        changes = _sentences(path.get("changes") or (), k)
+        rewards, margins, told = rewards[kept], margins[kept], [changes[i] for i in kept]
+        low, high, norms = np.append(low, ends[-1]), np.append(high, np.inf), np.append(norms, 0.0)
+        rewards = np.concatenate([rewards, np.zeros_like(rewards[:1])])  # above lambda_0 nothing is worth its price
+        margins = np.concatenate([margins, np.where(np.isnan(margins[:1]), np.nan, 0.0)])
+        return cls(low, high, rewards, margins, norms, (*told, changes[k]), k)
+
+
+def _sentences(changes: Sequence[Mapping[str, Any]], k: int) -> list[str]:
+    """A sentence for the beginning of each of k pieces, and of R = 0."""
+    told = [str(change.get("sentence", "")) for change in changes]
+    return told if len(told) == k + 1 else [""] * (k + 1)
+
+
+def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
+    """The section, and what its script shows at each position; None where there is no path."""
+    path = scene.run.lambda_path
+    if path is None or len(path["rewards"]) == 0:
+        told = scene.run.stages.get("ambiguity", {})
+        why = told.get("no_path") or told.get("no_ambiguity")
+        return Section("lambda", TITLE, f"{NO_PATH} {sentence_of(why)}".strip()), None
+    size = scene.place.layout.n_cells if scene.place is not None else 3 * BARS
+    pieces = Pieces.of_path(path, min(MOST_PIECES, MOST_CELLS // size))
+    sets = greedy_sets(scene, pieces.rewards)
+    shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
+    data = {
+        "start": _own(pieces, scene.run.certificate.get("l1")),
+        "pieces": [_told(pieces, i) for i in range(len(pieces.low))],
+        "figures": {panel.name: changing for panel, changing in shown},
+    }
+    thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
+    lead = (
+        "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "
+        f"lambda_0 = {number(pieces.low[-1])} on it is 0. Move the slider to walk through the pieces.{thinned}"
+    )
+    made = [panel for panel, _ in shown]
+    steps = {"last": len(pieces.low) - 1, "start": data["start"], "first": data["pieces"][data["start"]]}
+    return Section("lambda", TITLE, lead, made, "lambda", steps), data
+
+
+def greedy_sets(scene: Scene, rewards: np.ndarray) -> list[ActionSets]:
+    """The (S, A) greedy actions under each reward: all at once where the expert is optimal, else planned for."""
+    mdp, expert = scene.mdp, scene.expert
+    factor = Discounted(sp.csr_array(mdp.mixing(expert) @ mdp.P), mdp.gamma)
+    found = []
+    for values in rewards:
+        reward = TabularReward(values)
+        R, tolerance = reward.expected(mdp), TIE_TOLERANCE * float(np.abs(values).max())
+        V = factor.solve((expert * R).sum(axis=1))
+        Q = backup(mdp, R, V)
+        optimal = (Q.max(axis=1) <= V + tolerance + 1e-12)[~mdp.terminal].all()
+        found.append(tied(Q, tolerance + 1e-12) if optimal else optimal_actions(mdp, reward))
+    return found
+
+
+def _own(pieces: Pieces, l1: Any) -> int:
+    """The piece that the run's own lambda lies in; at a breakpoint the one before it."""
+    at = float(l1) if isinstance(l1, int | float) else 0.0
+    return max(int(np.searchsorted(pieces.low, at)) - 1, 0)
+
+
+def _told(pieces: Pieces, i: int) -> dict[str, str]:
+    """The words at a position."""
+    high = pieces.high[i]
+    span = f"{number(pieces.low[i])} to {number(high)}" if np.isfinite(high) else f"above {number(pieces.low[i])}"
+    largest = float(np.nanmax(np.abs(pieces.rewards[i])))
+    with_margin = int((pieces.margins[i] > 1e-9 * max(largest, 1e-300)).sum()) if largest else 0
+    judged = int(np.isfinite(pieces.margins[i]).sum())
+    paid = int((np.abs(pieces.rewards[i]) > 1e-9 * max(largest, 1e-300)).sum()) if largest else 0
+    return {
+        "span": span,
+        "number": f"{i + 1} of {len(pieces.low)}",
+        "norm": number(pieces.l1_norms[i]),
+        "margins": f"{with_margin:,} of {judged:,}",
+        "paid": f"{paid:,}",
+        "change": pieces.changes[i],
+    }
+
+
+def _shown_rewards(pieces: Pieces) -> np.ndarray:
+    """(k, S) rewards of states; of steps the largest over actions."""
+    return pieces.rewards if pieces.rewards.ndim == 2 else pieces.rewards.max(axis=2)
+
+
+def _rewards(scene: Scene, pieces: Pieces) -> tuple[Panel, dict[str, Any]]:
+    over = "" if pieces.rewards.ndim == 2 else ", the largest over actions"
+    return _changing(
+        scene, "path-reward", "Reward", _shown_rewards(pieces), panels.REWARDS, True, f"Reward at this lambda{over}.", "reward"
+    )
+
+
+def _margins(scene: Scene, pieces: Pieces) -> tuple[Panel, dict[str, Any]]:
+    caption = "How much better the expert's action is than the next best, at this lambda."
+    return _changing(scene, "path-margin", "Margins", pieces.margins, panels.WIDTHS, False, caption, "margin")
+
+
+def _changing(
+    scene: Scene, name: str, title: str, values: np.ndarray, scale: str, centred: bool, caption: str, unit: str
+) -> tuple[Panel, dict[str, Any]]:
+    """A figure of values (k, S), one row a position, with one scale for all of them."""
+    place, shown = scene.place, scene.mdp.reachable if centred else scene.acting
+    if place is not None:
+        suited = values[:, shown]
+        panel = maps.heat(
+            name, title, place, values[0], scale=scale, centred=centred, caption=caption, shown=shown, alike=suited
+        )
+        every = place.stride
+        hidden = place.layout.blocked | ~place.cells(shown)
+        pictures = [listed(np.where(hidden, np.nan, place.cells(one))[::every, ::every], 4) for one in values]
+        return panel, {"kind": "z", "trace": 1, "values": pictures}
+    rows = np.flatnonzero(shown & np.isfinite(values).all(axis=0))
+    rows = rows[np.argsort(-np.ptp(values[:, rows], axis=0), kind="stable")][:BARS]
+    rows = rows[telling(values[0][rows])]
+    caption += f" Drawn are the {rows.size} states in which it changes most."
+    panel = panels.bars(name, title, values[0][rows], scene.names(rows), what=unit, caption=caption, unit=unit)
+    panel.figure.data[0].marker = {"color": "var(--learned)"}
+    low, high = float(min(values[:, rows].min(initial=0), 0)), float(max(values[:, rows].max(initial=0), 0))
+    panel.figure.layout.xaxis.range = [1.05 * low, 1.05 * high or 1.0]
+    return panel, {"kind": "x", "trace": 0, "values": [listed(one[rows], 4) for one in values]}
+
+
+def _policy(scene: Scene, sets: list[ActionSets]) -> tuple[Panel, dict[str, Any]]:
+    """The greedy actions at each position."""
+    place, acting = scene.place, scene.acting
+    if place is not None and place.arrows:
+        caption = "The best actions under this reward; several arrows where several are equally good."
+        panel = maps.arrows("path-policy", "Best actions", place, sets[0], caption=caption, shown=acting)
+        return panel, {"kind": "arrows", "values": [maps.bits(place, one, acting) for one in sets]}
+    counts = [(one & acting[:, None]).sum(axis=0) for one in sets]
+    caption = "In how many states each action is a best one under this reward; ties count for each."
+    panel = panels.grouped_bars(
+        "path-policy", "Best actions", {"best": counts[0]}, scene.run.actions, caption=caption, unit="states"
+    )
+    panel.figure.layout.xaxis.range = [0, 1.05 * float(acting.sum())]
+    return panel, {"kind": "x", "trace": 0, "values": [listed(one) for one in counts]}
+
+
+def _norms(pieces: Pieces) -> tuple[Panel, dict[str, Any]]:
+    """||R||_1 along the path, with a mark at the slider's position."""
+    last = float(pieces.low[-1])
+    end = 1.08 * last or 1.0
+    x = [float(one) for low, high in zip(pieces.low, pieces.high, strict=True) for one in (low, min(high, end))]
+    figure = blank(
+        xaxis=axis(title={"text": "lambda"}, range=[0, end]),
+        yaxis=axis(title={"text": "||R||<sub>1</sub>"}, rangemode="tozero"),
+        shapes=[{"type": "line", "xref": "x", "yref": "paper", "y0": 0, "y1": 1, "x0": 0, "x1": 0,
+                 "line": {"color": "var(--warn)", "width": 3}}],
+    )  # fmt: skip
+    figure.add_scatter(
+        x=listed(np.array(x)), y=listed(np.repeat(pieces.l1_norms, 2)), mode="lines",
+        line={"color": "var(--learned)", "width": 2}, name=plotted("||R||_1"), hovertemplate="lambda %{x}: %{y}<extra></extra>",
+    )  # fmt: skip
+    caption = "The norm of the reward along the path; the upright line is the slider."
+    middle = [(low + min(high, end)) / 2 for low, high in zip(pieces.low, pieces.high, strict=True)]
+    return Panel("path-norm", "Norm of the reward", caption, figure, height=230), {
+        "kind": "cursor", "values": listed(np.array(middle)),
+    }  # fmt: skip

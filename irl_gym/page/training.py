@@ -1,0 +1,128 @@
+"""The learning curve, and how wide the feasible set leaves each state's reward."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from irl_gym.curves import Curve
+from irl_gym.page import panels
+from irl_gym.page.compared import of_states
+from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
+from irl_gym.page.scene import Scene
+from irl_gym.page.sections import Section
+from irl_gym.page.written import listed, number, sentence_of
+from irl_gym.runs import Run
+
+PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
+COLOURS = ("learned", "bad", "expert", "warn", "action4", "action6")
+
+
+def learning(run: Run) -> Section:
+    """What the agent earned under the true reward as it trained."""
+    curve = run.curve
+    if not len(curve.steps):
+        return Section("learning", "Learning curve", PLANNED)
+    policies = run.metrics["policies"]
+    made = [_values(curve, policies)]
+    if np.isfinite(curve.mean).any():
+        made.append(_returns(curve, policies))
+    taken = run.metrics["training"].get("steps_to_0.9")
+    told = (
+        f"From {taken:,} environment steps on the score stays at 0.9 or more."
+        if taken is not None
+        else "The score did not stay at 0.9 or more."
+    )
+    lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward. {told}"
+    return Section("learning", "Learning curve", lead, made)
+
+
+def _values(curve: Curve, policies: Mapping[str, Any]) -> Panel:
+    levels = {"expert": policies["expert"]["value"], "random": policies["random"]["value"]}
+    figure = curves({"retrained agent": (curve.steps, curve.value, None)}, levels, "discounted value from the start")
+    caption = (
+        f"Discounted value under the true reward, ending at {number(curve.value[-1])}; the expert has "
+        f"{number(levels['expert'])}, random actions {number(levels['random'])}."
+    )
+    return Panel("curve-value", "Value", caption, figure)
+
+
+def _returns(curve: Curve, policies: Mapping[str, Any]) -> Panel:
+    levels = {"expert": policies["expert"]["mean_return"], "random": policies["random"]["mean_return"]}
+    band = (curve.low, curve.high)
+    figure = curves({"retrained agent": (curve.steps, curve.mean, band)}, levels, "mean return of episodes")
+    caption = (
+        f"Mean undiscounted return of sampled episodes with its 95 % interval (shaded), {spread(curve.mean)}; the expert has "
+        f"{number(levels['expert'])}, random actions {number(levels['random'])}."
+    )
+    return Panel("curve-return", "Mean return", caption, figure)
+
+
+def curves(
+    series: Mapping[str, tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray] | None]],
+    levels: Mapping[str, float | None],
+    ylabel: str,
+) -> Any:
+    """Lines over environment steps, with bands where there are intervals, and dashed levels."""
+    figure = blank(
+        xaxis=axis(title={"text": "environment steps"}, separatethousands=True, rangemode="tozero"),
+        yaxis=axis(title={"text": ylabel}), showlegend=True, legend=below(), margin={"l": 8, "r": 12, "t": 44, "b": 8},
+    )  # fmt: skip
+    last = max(float(steps[-1]) for steps, *_ in series.values())
+    for i, (name, (steps, values, band)) in enumerate(series.items()):
+        colour = COLOURS[i % len(COLOURS)]
+        if band is not None:
+            x, y = np.concatenate([steps, steps[::-1]]), np.concatenate([band[1], band[0][::-1]])
+            figure.add_scatter(
+                x=listed(x, 9), y=listed(y), mode="lines", fill="toself", fillcolor=f"var(--{colour})", opacity=0.22,
+                line={"width": 0}, hoverinfo="skip", name="95 % interval",
+            )  # fmt: skip
+        figure.add_scatter(
+            x=listed(steps, 9), y=listed(values), mode="lines+markers", name=plotted(name),
+            line={"color": f"var(--{colour})", "width": 2}, marker={"size": 4},
+            hovertemplate="%{x:,} steps: %{y}",
+        )  # fmt: skip
+    for (name, level), colour in zip(levels.items(), ("expert", "muted"), strict=False):
+        if level is not None:
+            figure.add_scatter(
+                x=[0, last], y=[level, level], mode="lines", name=f"{plotted(name)} {number(level)}", hoverinfo="skip",
+                line={"color": f"var(--{colour})", "dash": "dash", "width": 2},
+            )  # fmt: skip
+    return figure
+
+
+def widths(scene: Scene) -> Section:
+    """How far the reward of each state is left open by what the expert does."""
+    title = "What the expert leaves open"
+    if scene.run.widths is None:
+        made = scene.run.stages.get("ambiguity", {})
+        why = sentence_of(made.get("no_widths") or made.get("no_ambiguity"))
+        return Section("widths", title, f"How wide the feasible set is was not worked out for this run. {why}".strip())
+    found = scene.run.widths
+    width, low, high = (_of_states(found[key], widest) for key, widest in (("width", True), ("low", False), ("high", True)))
+    shown = np.isfinite(width) & scene.mdp.reachable
+    if not shown.any():
+        return Section("widths", title, "No state's reward is bounded by what the expert does.")
+    lead = (
+        "All rewards under which the expert is optimal make up the feasible set. The width is how far a state's reward can "
+        "move within it: 0 says that the expert settles it, a wide one that almost anything goes."
+    )
+    made = [of_states("widths-map", "Feasible width", width, scene, f"Widths {spread(width[shown])}.",
+                      scale=panels.WIDTHS, centred=False, shown=shown, unit="width")]  # fmt: skip
+    if scene.place is not None:
+        made += [
+            of_states(f"widths-{key}", name, bound, scene, f"{name} of each state, {spread(bound[shown])}.",
+                      scale=panels.REWARDS, centred=True, shown=shown)
+            for key, name, bound in (("low", "Least feasible reward", low), ("high", "Largest feasible reward", high))
+        ]  # fmt: skip
+    return Section("widths", title, lead, made)
+
+
+def _of_states(values: Any, widest: bool) -> np.ndarray:
+    """(S,) numbers of states; of steps (S, A) the largest or the least over actions, NaN where there is none."""
+    array = np.asarray(values, dtype=float)
+    if array.ndim == 1:
+        return array
+    none = np.isnan(array).all(axis=1)
+    over = np.fmax.reduce(array, axis=1) if widest else np.fmin.reduce(array, axis=1)
+    return np.where(none, np.nan, over)

@@ -1,0 +1,44 @@
+"""Write the page of a finished run again: report.html, with everything in it.
+
+For example:
+    python scripts/report.py --run runs/demo
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+from rich.console import Console
+from rich.text import Text
+
+from irl_gym import IrlGymError
+from irl_gym.page.report import write_report
+from irl_gym.runs import read_run
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Write report.html of a finished run."""
+
+    run: Path
+    """The folder of the run."""
+    out: Path | None = None
+    """The file; the default is report.html in that folder."""
+
+
+def main(arguments: Arguments) -> int:
+    """Read the run and write its page."""
+    out = arguments.out or arguments.run / "report.html"
+    try:
+        write_report(read_run(arguments.run), out)
+    except (IrlGymError, OSError) as error:
+        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
+        Console(stderr=True, soft_wrap=True).print(text)
+        return 2
+    Console(soft_wrap=True).print(Text(f"Wrote {out}."))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Arguments, description=__doc__)))

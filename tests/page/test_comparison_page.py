@@ -1,0 +1,70 @@
+"""compare.html in a real browser: two and three runs, of one environment and of several."""
+
+import pytest
+from page.made_runs import stepped_run, table_run
+
+from irl_gym.errors import InvalidParameter
+from irl_gym.page.comparison import write_comparison
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("compared")
+    return {
+        "lake": table_run(folder / "lake", films=False),
+        "priced": table_run(folder / "priced", l1=0.3, seed=3, errors=5, films=False),
+        "cliff": table_run(folder / "cliff", "CliffWalking-v1", films=False),
+        "cart": stepped_run(folder / "<i>cart"),
+    }
+
+
+@pytest.fixture(scope="module")
+def pages(runs, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    write_comparison([runs["lake"], runs["priced"]], folder / "two.html")
+    write_comparison([runs["lake"], runs["cliff"], runs["cart"]], folder / "three.html")
+    return {"two": folder / "two.html", "three": folder / "three.html"}
+
+
+@pytest.mark.parametrize("which", ["two", "three"])
+def test_a_comparison_has_no_errors_and_asks_for_nothing(pages, look, which):
+    page = look(pages[which])
+    assert page.wrong == [] and all(url.startswith(("file:", "data:", "blob:")) for url in page.asked)
+    assert page.evaluate("[...document.querySelectorAll('.plot')].every(one => one.querySelector('.main-svg'))")
+
+
+@pytest.mark.parametrize("which", ["two", "three"])
+def test_a_comparison_fits_a_phone_and_is_small(pages, look, which):
+    assert look(pages[which], width=390).evaluate("document.documentElement.scrollWidth") == 390
+    assert pages[which].stat().st_size < 8_000_000
+
+
+def test_each_run_has_a_column_a_curve_and_a_reward(pages, look):
+    page = look(pages["three"])
+    assert page.locator("#results thead th").all_inner_texts()[1:] == ["run A", "run B", "run C"]
+    assert page.locator("#rewards .plot").count() == 3
+    assert page.evaluate("document.getElementById('curves').data.map(one => one.name)")[:3] == ["run A", "run B", "run C"]
+
+
+def test_curves_of_different_environments_are_scores(pages, look):
+    assert look(pages["three"]).locator("#curves-title").inner_text() == "Score"
+    assert look(pages["two"]).locator("#curves-title").inner_text() == "Discounted value from the start"
+
+
+def test_only_what_differs_of_the_configurations_is_listed(pages, look):
+    assert look(pages["two"]).locator("#differences tbody th").all_inner_texts() == ["learner.l1", "seed"]
+
+
+def test_the_name_of_a_folder_is_never_markup(pages, look):
+    assert "<i>cart" in look(pages["three"]).locator("header").inner_text()
+
+
+def test_the_same_runs_make_the_same_bytes(pages, runs, tmp_path):
+    write_comparison([runs["lake"], runs["priced"]], tmp_path / "again.html")
+    assert (tmp_path / "again.html").read_bytes() == pages["two"].read_bytes()
+
+
+@pytest.mark.parametrize("n", [0, 1, 27])
+def test_a_comparison_of_too_few_or_too_many_is_refused(runs, tmp_path, n):
+    with pytest.raises(InvalidParameter, match=f"runs has {n}"):
+        write_comparison([runs["lake"]] * n, tmp_path / "none.html")

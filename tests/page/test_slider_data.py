@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from page.made_runs import table_run
+
+from irl_gym.metrics import optimal_actions
+from irl_gym.page.scene import Scene
+from irl_gym.page.slider import Pieces, greedy_sets, lambda_slider
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    found = Scene.of(table_run(tmp_path_factory.mktemp("run"), films=False))
+    assert found is not None
+    return found
+
+
+def test_greedy_sets_are_the_optimal_actions(scene):
+    rewards = scene.run.lambda_path["rewards"]
+    for values, found in zip(rewards, greedy_sets(scene, rewards), strict=True):
+        np.testing.assert_array_equal(found[scene.acting], optimal_actions(scene.mdp, values)[scene.acting])
+
+
+def test_greedy_sets_are_the_optimal_actions_where_the_expert_is_none(scene):
+    values = -scene.run.lambda_path["rewards"][:1]
+    (found,) = greedy_sets(scene, values)
+    np.testing.assert_array_equal(found[scene.acting], optimal_actions(scene.mdp, values[0])[scene.acting])
+
+
+def test_the_last_piece_is_no_reward(scene):
+    pieces = Pieces.of_path(scene.run.lambda_path, 100)
+    assert not pieces.rewards[-1].any() and np.isinf(pieces.high[-1]) and pieces.l1_norms[-1] == 0
+
+
+def test_pieces_that_are_left_out_leave_no_gap(scene):
+    pieces = Pieces.of_path(scene.run.lambda_path, 3)
+    np.testing.assert_array_equal(pieces.high[:-1], pieces.low[1:])
+    assert len(pieces.low) == 4 and pieces.low[0] == 0 and pieces.of == 6
+
+
+def test_each_position_has_its_words_and_pictures(scene):
+    section, data = lambda_slider(scene)
+    assert data is not None and section.kind == "lambda"
+    assert {len(one["values"]) for one in data["figures"].values()} == {len(data["pieces"])} == {7}
+    assert all(piece["change"].startswith("At price") for piece in data["pieces"])
+
+
+def test_the_slider_starts_at_the_run_s_own_price(tmp_path):
+    found = Scene.of(table_run(tmp_path, l1=0.5, films=False))
+    assert found is not None
+    ends, (_, data) = found.run.lambda_path["breakpoints"], lambda_slider(found)
+    assert data is not None and ends[data["start"]] < 0.5 <= ends[data["start"] + 1]

@@ -1,0 +1,235 @@
+"""What a run leaves is read back whole; what is missing, damaged or newer is named."""
+
+import json
+import shlex
+import shutil
+
+import numpy as np
+import pytest
+from tiny_env import TableEnv, lottery
+
+from irl_gym.curves import Curve, read_curve, sampled_returns, write_curve
+from irl_gym.errors import RunIncomplete, RunNewer
+from irl_gym.experiment import Experiment
+from irl_gym.layouts import grid_layout
+from irl_gym.loop import Loop
+from irl_gym.metrics import policy_value
+from irl_gym.names import action_names, state_name
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import SB3
+from irl_gym.run_folder import read_json, write_json
+from irl_gym.runs import read_run
+
+COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
+LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
+
+
+def asked(**changes):
+    return Experiment("FrozenLake-v1", 0.99, **{"retrain": SB3(total_timesteps=8_192), **LAKE, **changes})
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs") / "lake"
+    recover_and_retrain(asked(), out, command=COMMAND)
+    return out
+
+
+@pytest.fixture(scope="module")
+def run(finished):
+    return read_run(finished)
+
+
+@pytest.fixture
+def copied(finished, tmp_path):
+    return shutil.copytree(finished, tmp_path / "copy")
+
+
+def test_a_run_knows_its_command_as_a_shell_reads_it(run):
+    assert shlex.split(run.command) == list(COMMAND)
+
+
+def test_a_run_knows_its_environment(run):
+    assert (run.env_id, run.actions) == ("FrozenLake-v1", ("left", "down", "right", "up"))
+
+
+def test_a_run_holds_its_table(run):
+    assert (run.table.mdp.n_states, run.table.mdp.gamma, run.state_name(5)) == (16, 0.99, "row 1, column 1")
+
+
+def test_a_run_holds_reward_expert_and_agent(run):
+    assert run.tabular.values.shape == run.expert.shape == run.agent.shape == (16,)
+
+
+def test_a_run_holds_its_map(run):
+    assert run.grid.shape == (4, 4) and run.grid.letters[3, 3] == "G"
+
+
+def test_a_map_is_read_as_it_was_written(toy_text):
+    import gymnasium as gym
+
+    layout = grid_layout(gym.make("CliffWalking-v1"), toy_text("CliffWalking").mdp)
+    again = type(layout).from_json(json.loads(json.dumps(layout.to_json())))
+    assert all(np.array_equal(getattr(layout, name), getattr(again, name)) for name in layout.__dataclass_fields__)
+
+
+def test_a_run_holds_widths_and_lambda_path(run):
+    assert np.array_equal(run.widths["width"], run.widths["high"] - run.widths["low"], equal_nan=True)
+    path = run.lambda_path
+    assert len(path["breakpoints"]) == len(path["changes"]) == len(path["rewards"]) + 1
+
+
+def test_the_diagnosis_is_the_doctors(run):
+    assert run.diagnosis["healthy"] is (run.diagnosis["findings"] == [])
+
+
+def test_the_curve_has_an_interval_around_its_mean(run):
+    curve = run.curve
+    assert curve.steps.size > 50 and (curve.low <= curve.mean).all() and (curve.mean <= curve.high).all()
+
+
+def test_the_metrics_csv_is_read_in_one_line(finished, run):
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(finished / "metrics.csv").pivot(index="policy", columns="metric", values="value")
+    assert table.loc["retrained", "value"] == run.metrics["policies"]["retrained"]["value"]
+
+
+def test_tensorboard_has_sb3s_scalars_and_the_curve(finished, run):
+    event_accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    found = {}
+    for file in sorted((finished / "tensorboard" / "retrained").iterdir()):
+        events = event_accumulator.EventAccumulator(str(file))
+        events.Reload()
+        found |= {tag: events.Scalars(tag) for tag in events.Tags()["scalars"]}
+    assert {"train/loss", "rollout/ep_rew_mean"} <= set(found)
+    assert [event.step for event in found["loop/mean_return"]] == run.curve.steps.astype(int).tolist()
+
+
+def test_a_run_whose_logs_were_deleted_is_kept(copied):
+    shutil.rmtree(copied / "tensorboard")
+    assert recover_and_retrain(asked(), copied).stages["agent"]["kept"]
+
+
+def test_the_command_of_the_first_start_is_kept(copied):
+    recover_and_retrain(asked(), copied, command=("python", "another.py"))
+    assert read_run(copied).version["command"] == list(COMMAND)
+
+
+def test_the_command_is_no_part_of_what_identifies_a_run(finished):
+    assert read_json(finished / "config.json") == json.loads(json.dumps(asked().to_json()))
+
+
+# --- what cannot be read ---
+
+
+@pytest.mark.parametrize(
+    "name", ["reward.npz", "metrics.json", "agent_policy.npz", "table.npz", "learning_curve.csv", "films/agent/000.webp"]
+)
+def test_a_run_without_a_file_is_incomplete_by_name(copied, name):
+    (copied / name).unlink()
+    with pytest.raises(RunIncomplete, match=rf"{name} is missing.*--out 'a folder'"):
+        read_run(copied)
+
+
+@pytest.mark.parametrize("name", ["reward.npz", "metrics.json", "grid.json", "ambiguity.npz", "films/agent.json", "table.npz"])
+def test_a_run_with_a_damaged_file_is_incomplete_by_name(copied, name):
+    (copied / name).write_bytes(b"[1]")
+    with pytest.raises(RunIncomplete, match=f"{name} cannot be read"):
+        read_run(copied)
+
+
+def test_a_run_that_was_killed_is_incomplete_by_its_stage(tmp_path):
+    loop = Loop(asked(), tmp_path, command=COMMAND)
+    loop.stage("expert")
+    with pytest.raises(RunIncomplete, match=r"the stage 'demonstrations' was not finished.*recover_and_retrain\.py"):
+        read_run(tmp_path)
+
+
+def test_a_run_from_python_is_continued_from_python(tmp_path):
+    Loop(asked(), tmp_path)
+    with pytest.raises(RunIncomplete, match=r"recover_and_retrain\(experiment"):
+        read_run(tmp_path)
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(RunIncomplete, match="holds no run"):
+        read_run(tmp_path)
+
+
+@pytest.mark.parametrize("read", [read_run, lambda path: recover_and_retrain(asked(), path)])
+def test_a_run_of_a_newer_version_asks_for_an_upgrade(copied, read):
+    write_json(copied / "run.json", {"format": "irl_gym.Run/2", "irl_gym": "9.0.0", "command": None})
+    with pytest.raises(RunNewer, match=r"written by irl_gym 9\.0\.0: expected 'irl_gym\.Run/1'.*Upgrade"):
+        read(copied)
+
+
+# --- runs of earlier versions ---
+
+
+@pytest.fixture
+def older(copied):
+    """A run as version 0.1 left it."""
+    for name in ("films", "tensorboard"):
+        shutil.rmtree(copied / name)
+    for name in ("run.json", "environment.json", "grid.json", "metrics.csv", "ambiguity.npz", "diagnosis.json", "report.html"):
+        (copied / name).unlink()
+    for stage in ("record", "ambiguity", "report"):
+        (copied / ".stages" / f"{stage}.json").unlink()
+    lines = [",".join(line.split(",")[:2]) for line in (copied / "learning_curve.csv").read_text().splitlines()]
+    (copied / "learning_curve.csv").write_text("\r\n".join(lines) + "\r\n")
+    return copied
+
+
+def test_a_run_of_an_earlier_version_is_read_without_what_it_lacks(older):
+    run = read_run(older)
+    assert (run.command, run.films, run.grid, run.widths, run.lambda_path) == (None, {}, None, None, None)
+    assert np.isnan(run.curve.mean).all() and run.table.mdp.n_states == 16 and run.actions[0] == "left"
+
+
+def test_a_run_of_an_earlier_version_gets_the_new_stages_only(older):
+    made = recover_and_retrain(asked(), older)
+    assert [name for name, record in made.stages.items() if not record.get("kept")] == [
+        "table",
+        "record",
+        "ambiguity",
+        "report",
+    ]
+    assert set(read_run(older).films) == {"expert", "agent"} and made.page.exists()
+
+
+# --- the parts ---
+
+
+def test_sampled_returns_have_the_mean_that_the_table_says(toy_text):
+    table = toy_text("FrozenLake 4x4 slippery")
+    policies = [np.full(16, 1), np.full(16, 2)]
+    found = sampled_returns(table, policies, 4_000, limit=100, seed=0)
+    undiscounted = type(table.mdp)(table.mdp.P, 1 - 1e-9, table.mdp.d0)
+    for returns, policy in zip(found, policies, strict=True):
+        error = returns.std() / np.sqrt(returns.size)
+        assert abs(returns.mean() - policy_value(undiscounted, table.reward, policy, horizon=100)) < 4 * error
+
+
+def test_a_curve_is_read_as_it_was_written(tmp_path):
+    curve = Curve(*np.random.default_rng(0).random((5, 7)).round(12))
+    write_curve(Curve(np.arange(7.0), curve.value, curve.mean, curve.low, curve.high), tmp_path / "curve.csv")
+    again = read_curve(tmp_path / "curve.csv")
+    assert np.array_equal(again.steps, np.arange(7)) and np.array_equal(again.high, curve.high)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "observation", "name"),
+    [
+        ("Taxi-v4", 328, "taxi 3, 1; passenger at Y, to R"),
+        ("Blackjack-v1", {"natural": 1, "observation": (21, 1, 1)}, "21 with an ace against ace, natural 1"),
+        ("Deck-v0", (3, 1), "(3, 1)"),
+        ("CartPole-v1", np.array([0.01234, -1.0, 0, 0], dtype=np.float32), "(0.0123, -1, 0, 0)"),
+        (None, np.zeros((7, 7, 3), dtype=np.uint8), "7 x 7 x 3 numbers"),
+    ],
+)
+def test_a_state_is_called_by_its_observation(env_id, observation, name):
+    assert state_name(env_id, observation) == name
+
+
+def test_actions_that_nobody_named_are_numbered():
+    assert action_names(TableEnv(lottery(0.5), [1.0])) == ("action 0",)

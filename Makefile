@@ -35,6 +35,9 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
 	$(BIN)/python scripts/measure_learners.py
+	$(BIN)/python scripts/measure_metrics.py
+	$(BIN)/python scripts/measure_ambiguity.py
+	$(BIN)/python scripts/reward_distances.py
 	$(BIN)/python scripts/measure_environments.py
 	$(BIN)/python scripts/measure_demonstrations.py
 	$(BIN)/python scripts/reproduce_ng_russell.py

@@ -22,8 +22,10 @@ from gymnasium.envs.toy_text import blackjack
 
 from irl_gym.errors import NotTabular
 from irl_gym.listed_states import ListedStates, in_order
+from irl_gym.reveal import layers
 from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
 from irl_gym.watching import only_watches
+from irl_gym.wrappers import LearnedReward
 
 STICK, HIT = 0, 1
 DEALER_STICKS = 17
@@ -191,15 +193,16 @@ def dealer_outcomes(shown: int, cards: Cards) -> dict[tuple[int, bool], Fraction
 
 def _shows_naturals(env: gym.Env) -> bool | None:
     """Does the observation show whether the hand is a natural? None where a wrapper changes something else."""
-    plain, shown, wrapper = env.unwrapped.observation_space, False, env
+    plain, shown = env.unwrapped.observation_space, False
     flagged = spaces.Dict({"observation": plain, "natural": spaces.Discrete(2)})
-    while isinstance(wrapper, gym.Wrapper):
+    for wrapper in layers(env):
+        if not isinstance(wrapper, gym.Wrapper):
+            break
         if wrapper.observation_space == flagged and wrapper.env.observation_space == plain:
             shown = True
         # LearnedReward changes only the reward, which `tabulate` takes from it.
-        elif not (only_watches(wrapper) or type(wrapper).__name__ == "LearnedReward"):
+        elif not (only_watches(wrapper) or isinstance(wrapper, LearnedReward)):
             return None
-        wrapper = wrapper.env
     return shown if env.observation_space == (flagged if shown else plain) else None
 
 

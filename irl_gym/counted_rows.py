@@ -16,6 +16,7 @@ from irl_gym.checks import checked_number
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import entry_rows
 from irl_gym.selfcheck import Payments
+from irl_gym.tabulation import moments
 from irl_gym.tally import Tally
 
 
@@ -64,13 +65,8 @@ class Entries:
 
     def payments(self, p: np.ndarray, shape: tuple[int, int]) -> Payments:
         """What steps pay, in expectation under P."""
-        first, second = (
-            np.bincount(self.rows, weights=p * moment, minlength=shape[0] * shape[1]).reshape(shape)
-            for moment in (self.mean, self.square)
-        )
-        variance = second - first**2
-        deviation = np.sqrt(np.where(variance > 1e-12 * second, variance, 0.0))
-        return Payments(first, deviation, self.mean if self.certain else None, self.largest)
+        mean, deviation = moments(self.rows, p, self.mean, self.square, shape)
+        return Payments(mean, deviation, self.mean if self.certain else None, self.largest)
 
 
 def seen_entries(seen: Tally, states: ListedStates, n_actions: int) -> tuple[Entries, np.ndarray]:

@@ -27,7 +27,7 @@ def checked_counts(seen: EmpiricalPolicy) -> np.ndarray:
     """(S, A) the counts.
 
     Raises:
-        InvalidDemonstrations: counts that are negative, not whole numbers, not a table, or all 0.
+        InvalidDemonstrations: counts that are negative, not whole numbers, not a table, all 0, or too large to add up.
     """
     counts = np.asarray(seen.counts)
     if counts.ndim != 2 or counts.dtype.kind not in "iu":
@@ -41,6 +41,9 @@ def checked_counts(seen: EmpiricalPolicy) -> np.ndarray:
         raise InvalidDemonstrations(f"counts[s={s}, a={a}] is {counts[s, a]}: expected how often the action was taken.")
     if not counts.any():
         raise InvalidDemonstrations("no action was seen in any state: expected at least one step.")
+    total = counts.sum(axis=1, dtype=np.float64).max()
+    if total >= 2**63:
+        raise InvalidDemonstrations(f"the counts of a state add up to {total:.3g}: expected less than 2^63 steps.")
     return counts.astype(np.int64)
 
 
@@ -72,8 +75,9 @@ def smoothed(seen: EmpiricalPolicy, concentration: float = 1.0) -> Matrix:
         InvalidParameter: a concentration that is not above 0.
     """
     c = checked_number("concentration", concentration, "a number above 0, such as 1.0", above=0)
-    counts = checked_counts(seen) + c
-    return _masked(counts / counts.sum(axis=1, keepdims=True), checked_counts(seen))
+    counts = checked_counts(seen)
+    more = counts + c
+    return _masked(more / more.sum(axis=1, keepdims=True), counts)
 
 
 def most_frequent(seen: EmpiricalPolicy) -> Matrix:

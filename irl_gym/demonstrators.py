@@ -6,7 +6,6 @@ stepped by a policy with a generator of its own, after `reset(seed=seed + i)`.
 Axes: S states, A actions, T steps, n episodes of a chunk.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
@@ -27,7 +26,7 @@ from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.experts import Acting, load_expert
 from irl_gym.export import Demonstrator
-from irl_gym.given import check_agent
+from irl_gym.given import check_agent, digest, is_file
 from irl_gym.mdp import check_discount
 from irl_gym.minari_files import spec_json
 from irl_gym.noise import Noisy, checked_epsilon, noisy
@@ -136,7 +135,7 @@ class Recording:
         for name in ("max_episode_steps", "total_timesteps", "max_states"):
             if getattr(self, name) is not None:
                 checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
-        if self.expert not in NAMED and not Path(self.expert).is_file():
+        if self.expert not in NAMED and not is_file(self.expert):
             raise InvalidParameter(
                 f"expert is {self.expert!r}, which is no file: expected one of {', '.join(NAMED)}, or the path of SB3's zip "
                 "or of an npz of actions."
@@ -151,7 +150,7 @@ class Recording:
         spec = spec_json(env.spec)
         found = {**asdict(self), "environment": repr(env) if spec is None else json.loads(spec)}
         if self.expert not in NAMED:
-            found["expert"] = f"file with sha256 {hashlib.sha256(Path(self.expert).read_bytes()).hexdigest()}"
+            found["expert"] = f"file with sha256 {digest(self.expert)}"
         return found
 
     def metadata(self, env_id: str) -> dict[str, Any]:

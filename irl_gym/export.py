@@ -28,8 +28,9 @@ import minari
 from irl_gym.checks import checked_number
 from irl_gym.datasets import writable_root
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import InvalidParameter, RunConflict
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, RunConflict
 from irl_gym.minari_files import Description, check_free, publish, write_files
+from irl_gym.rewards import plain_json
 from irl_gym.run_folder import write_json
 from irl_gym.shards import SHARD_BYTES, Shards, size_of
 
@@ -73,6 +74,7 @@ class Amount:
         for name in ("episodes", "steps"):
             if getattr(self, name) is not None:
                 checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
+                object.__setattr__(self, name, int(getattr(self, name)))
 
     def share(self, episodes: int, steps: int) -> float:
         """How much of it so many episodes and steps are; 1 when it is reached."""
@@ -103,12 +105,13 @@ def export_dataset(
         DatasetExists: the id is taken; said before anything is drawn.
         RunConflict: an export of another plan to this id was begun, or another process is at it.
         InvalidParameter: a root that cannot be written.
+        InvalidDemonstrations: the demonstrator ended before the amount was reached; what it gave is kept.
     """
     report = on_progress or (lambda stage, share: None)
     wanted = json.loads(json.dumps({
         **plan, "dataset_id": about.dataset_id, "data_format": about.data_format, "episodes": amount.episodes,
         "steps": amount.steps,
-    }))  # fmt: skip
+    }, default=plain_json))  # fmt: skip
     with writable_root(root) as base:
         folder = base / f".exporting-{hashlib.sha256(about.dataset_id.encode()).hexdigest()[:16]}"
         if not folder.exists():
@@ -213,6 +216,10 @@ def _draw(shards: Shards, demonstrator: Demonstrator, amount: Amount, report: On
             held, size, closed = [], 0, time.monotonic()
         if share == 1:
             return
+    shards.append(held)
+    raise InvalidDemonstrations(
+        f"the demonstrator ended after episode {episodes - 1}: expected episodes without end. Give one that goes on."
+    )
 
 
 def _remove(folder: Path) -> None:

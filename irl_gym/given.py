@@ -1,6 +1,7 @@
 """An expert that is given as a file: SB3's zip of an agent, or an npz of a table's actions, as runs leave them."""
 
 import hashlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,15 +32,15 @@ class FromFile:
     """Of the file, so that a run knows it again; `FromFile.at` fills it in."""
 
     def __post_init__(self) -> None:
-        if not Path(self.path).is_file():
+        if not is_file(self.path):
             raise InvalidParameter(f"expert is {self.path!r}, which is no file: expected SB3's zip, or an npz of actions.")
-        if self.sha256 is not None and self.sha256 != _digest(self.path):
+        if self.sha256 is not None and self.sha256 != digest(self.path):
             raise InvalidParameter(f"{self.path} is not the file that it was (sha256 {self.sha256[:8]}...): expected the same.")
 
     @classmethod
     def at(cls, path: str) -> "FromFile":
         """The expert in a file, with the file's digest."""
-        return cls(path, _digest(path) if Path(path).is_file() else None)
+        return cls(path, digest(path) if is_file(path) else None)
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Policy:
         """The policy in the file.
@@ -65,7 +66,13 @@ class FromFile:
         return TabularPolicy(as_distribution(found, env.table.n_states, env.table.n_actions), env.states, seed)
 
 
-def _digest(path: str) -> str:
+def is_file(path: Any) -> bool:
+    """Is this the path of a file that is there?"""
+    return isinstance(path, str | os.PathLike) and Path(path).is_file()
+
+
+def digest(path: str) -> str:
+    """The sha256 of a file."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
@@ -88,13 +95,14 @@ def check_agent(agent: Agent, observations: Any, actions: spaces.Space) -> None:
     """
     found, taken = agent.model.observation_space, agent.model.action_space
     fits = taken == actions and (found == observations or not isinstance(observations, spaces.Discrete))
+    cause = None
     try:
         if fits and found != observations:  # SB3 turns pictures, so spaces that differ may fit
             agent.predict(observations.sample(), deterministic=True)
-    except (ValueError, TypeError, KeyError, AttributeError, RuntimeError):
-        fits = False
+    except (ValueError, TypeError, KeyError, AttributeError, RuntimeError) as error:
+        fits, cause = False, error
     if not fits:
         raise DatasetMismatch(
             f"the expert is an agent for observations {found} and actions {taken}: expected {observations} and {actions}, the "
             "environment's. Is it another environment's?"
-        )
+        ) from cause

@@ -1,11 +1,11 @@
 """Spaces made of integers: any observation as a few integers, and back.
 
 Discrete, MultiDiscrete, MultiBinary, integer Box, and Tuple or Dict of these are products of finite ranges, so an observation
-is a vector of k integers, its *numbers*. Batches are stacked as vector environments
-stack them. Axes: N observations, k numbers.
+is a vector of k integers, its *numbers*. Batches are stacked as vector environments stack them.
+Axes: N observations, k numbers.
 """
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import singledispatch
 from typing import Any
 
@@ -17,7 +17,11 @@ from irl_gym.errors import NotDiscrete, UnknownObservation
 
 @singledispatch
 def ranges(space: spaces.Space) -> np.ndarray:
-    """The finite ranges of a space: (n, 2) rows of lowest value and count."""
+    """The finite ranges of a space: (k, 2) rows of lowest value and count.
+
+    Raises:
+        NotDiscrete: a part that is not made of integers, is empty, or has more values than 64 bits can number.
+    """
     mend = "Discretise the environment first."
     if type(space).__name__ == "MissionSpace":
         mend = "MiniGrid's environments have their whole state as integers in `irl_gym_envs:irl_gym/MiniGrid-v0`."
@@ -51,47 +55,89 @@ def _(space: spaces.Box) -> np.ndarray:
             f"{space} holds floats: expected integers. Discretise the environment first, with `discretize(env, gamma=..., "
             "bins=...)` if its state can be set."
         )
-    low, high = space.low.ravel().astype(np.int64), space.high.ravel().astype(np.int64)
-    if (high.astype(float) - low.astype(float)).max(initial=0.0) > 2**62:  # the count would wrap around
-        raise NotDiscrete(f"{space} has more than 2^62 elements: too many to number. Give it narrower bounds.")
+    low, high = space.low.ravel(), space.high.ravel()
+    if not low.size:
+        raise _nothing(space)
+    # As 64-bit integers the bounds of an unsigned Box, or the count, would wrap around.
+    if (high.astype(float) - low.astype(float)).max() > 2**62 or int(high.max()) >= 2**63:
+        raise NotDiscrete(f"{space} has more than 2^62 elements, or larger ones: too many to number. Give it narrower bounds.")
+    low, high = low.astype(np.int64), high.astype(np.int64)
     return np.stack([low, high - low + 1], axis=1)
 
 
 @ranges.register
-def _(space: spaces.Tuple) -> np.ndarray:
-    return np.concatenate([ranges(part) for part in space.spaces])
+def _(space: spaces.Tuple | spaces.Dict) -> np.ndarray:
+    parts = _parts(space)
+    if not parts:
+        raise _nothing(space)
+    return np.concatenate([ranges(part) for part in parts])
 
 
-@ranges.register
-def _(space: spaces.Dict) -> np.ndarray:
-    return np.concatenate([ranges(part) for part in space.spaces.values()])
+def _nothing(space: spaces.Space) -> NotDiscrete:
+    return NotDiscrete(f"{space} is empty: expected at least one number. Leave it out, with a wrapper that shows the rest.")
+
+
+def _parts(space: spaces.Tuple | spaces.Dict) -> list[spaces.Space]:
+    return list(space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces)
+
+
+def _columns(space: spaces.Tuple | spaces.Dict, numbers: np.ndarray) -> Iterable[tuple[spaces.Space, np.ndarray]]:
+    """The parts of a space, each with its columns of numbers (N, k)."""
+    parts = _parts(space)
+    ends = np.cumsum([len(ranges(part)) for part in parts])[:-1]
+    return zip(parts, np.split(numbers, ends, axis=1), strict=True)
 
 
 @singledispatch
 def to_numbers(space: spaces.Space, batch: Any) -> np.ndarray:
-    """A batch of observations as integers: (N, n)."""
-    array = np.asarray(batch)
+    """A batch of observations as integers: (N, k).
+
+    Raises:
+        UnknownObservation: no batch of the space's observations, by its dtype, shape, parts or keys.
+    """
+    try:
+        array = np.asarray(batch)
+    except ValueError as error:
+        raise UnknownObservation(f"observations {_shown(batch)} differ in shape: expected members of {space}.") from error
     if array.dtype.kind not in "iub":
-        raise UnknownObservation(f"observation {batch!r} has dtype {array.dtype}: expected integers of {space}.")
-    shape = space.shape or ()
-    if array.shape[1:] != shape:
+        raise UnknownObservation(f"observation {_shown(batch)} has dtype {array.dtype}: expected integers of {space}.")
+    if not array.ndim:
+        raise UnknownObservation(f"observation {_shown(batch)} is no batch: expected (N, ...) of {space}. `encode` takes one.")
+    if array.shape[1:] != (shape := space.shape or ()):
         raise UnknownObservation(f"observation of shape {array.shape[1:]}: expected {shape}, a member of {space}.")
-    return array.reshape(len(array), -1).astype(np.int64)
+    if array.dtype == np.uint64 and array.size and array.max() > np.iinfo(np.int64).max:  # it would wrap around
+        raise UnknownObservation(f"observation holds {array.max()}: expected a member of {space}.")
+    return array.reshape(len(array), int(np.prod(shape))).astype(np.int64)
+
+
+def _shown(value: Any) -> str:
+    """The beginning of what was given, on one line."""
+    return " ".join(repr(value).split())[:90]
 
 
 @to_numbers.register
 def _(space: spaces.Tuple, batch: Any) -> np.ndarray:
+    if not isinstance(batch, list | tuple | np.ndarray) or not getattr(batch, "ndim", 1):
+        raise UnknownObservation(f"observation {_shown(batch)}: expected a tuple, a member of {space}.")
     if len(batch) != len(space.spaces):
         raise UnknownObservation(f"observation has {len(batch)} parts: expected {len(space.spaces)}, a member of {space}.")
-    return np.concatenate([to_numbers(part, batch[i]) for i, part in enumerate(space.spaces)], axis=1)
+    return _side_by_side([to_numbers(part, batch[i]) for i, part in enumerate(space.spaces)], space)
 
 
 @to_numbers.register
 def _(space: spaces.Dict, batch: Any) -> np.ndarray:
+    if not isinstance(batch, Mapping):
+        raise UnknownObservation(f"observation {_shown(batch)}: expected a dict, a member of {space}.")
     missing = sorted(set(space.spaces) - set(batch))
     if missing:
         raise UnknownObservation(f"observation has no key {missing[0]!r}: expected the keys {sorted(space.spaces)}.")
-    return np.concatenate([to_numbers(part, batch[key]) for key, part in space.spaces.items()], axis=1)
+    return _side_by_side([to_numbers(part, batch[key]) for key, part in space.spaces.items()], space)
+
+
+def _side_by_side(columns: list[np.ndarray], space: spaces.Space) -> np.ndarray:
+    if len(lengths := {len(one) for one in columns}) > 1:
+        raise UnknownObservation(f"parts of observations are {sorted(lengths)} long: expected one length, members of {space}.")
+    return np.concatenate(columns, axis=1)
 
 
 @singledispatch
@@ -102,16 +148,12 @@ def from_numbers(space: spaces.Space, numbers: np.ndarray) -> Any:
 
 @from_numbers.register
 def _(space: spaces.Tuple, numbers: np.ndarray) -> Any:
-    ends = np.cumsum([len(ranges(part)) for part in space.spaces])[:-1]
-    parts = zip(space.spaces, np.split(numbers, ends, axis=1), strict=True)
-    return tuple(from_numbers(part, columns) for part, columns in parts)
+    return tuple(from_numbers(*one) for one in _columns(space, numbers))
 
 
 @from_numbers.register
 def _(space: spaces.Dict, numbers: np.ndarray) -> Any:
-    ends = np.cumsum([len(ranges(part)) for part in space.spaces.values()])[:-1]
-    parts = zip(space.spaces.items(), np.split(numbers, ends, axis=1), strict=True)
-    return {key: from_numbers(part, columns) for (key, part), columns in parts}
+    return {key: from_numbers(*one) for key, one in zip(space.spaces, _columns(space, numbers), strict=True)}
 
 
 @singledispatch
@@ -154,26 +196,31 @@ def _(space: spaces.Dict, batch: Any) -> Any:
 
 
 def is_batch(space: spaces.Space, observation: Any) -> bool:
-    """Is this an array of observations of a space, not a single one?"""
-    if isinstance(space, spaces.Dict):
-        name, part = next(iter(space.spaces.items()))
-        return is_batch(part, observation[name])
-    if isinstance(space, spaces.Tuple):
-        return bool(space.spaces) and is_batch(space.spaces[0], observation[0])
-    return space.shape is not None and np.ndim(observation) == len(space.shape) + 1
+    """Is this an array of observations of a space, not a single one? What is neither, and `to_numbers` refuses, is none."""
+    try:
+        if isinstance(space, spaces.Dict):
+            name, part = next(iter(space.spaces.items()))
+            return is_batch(part, observation[name])
+        if isinstance(space, spaces.Tuple):
+            return bool(space.spaces) and is_batch(space.spaces[0], observation[0])
+        return space.shape is not None and np.ndim(observation) == len(space.shape) + 1
+    except (TypeError, IndexError, KeyError, ValueError):
+        return False
 
 
 @singledispatch
 def key_of(space: spaces.Space) -> Callable[[Any], Hashable]:
     """What gives the key of an observation: equal for equal observations, and fast. `numbers_of_keys` reads it back."""
-    dtype = np.dtype(space.dtype)
+    dtype, shape = np.dtype(space.dtype), space.shape or ()
 
     def key(observation: Any) -> bytes:
         array = np.asarray(observation)
+        if array.shape != shape or array.dtype.kind not in "iub":
+            to_numbers(space, array[None])  # says what is wrong
         if array.dtype != dtype:
-            if array.dtype.kind not in "iub":
-                raise UnknownObservation(f"observation {observation!r} has dtype {array.dtype}: expected integers of {space}.")
-            array = array.astype(dtype)
+            given, array = array, array.astype(dtype)
+            if (array != given).any():  # 256 as a byte would be the key of 0
+                raise UnknownObservation(f"observation {_shown(observation)} is not of {dtype}: expected a member of {space}.")
         return array.tobytes()
 
     return key
@@ -181,7 +228,13 @@ def key_of(space: spaces.Space) -> Callable[[Any], Hashable]:
 
 @key_of.register
 def _(space: spaces.Discrete) -> Callable[[Any], Hashable]:
-    return int
+    def key(observation: Any) -> int:
+        number = int(observation)
+        if number != observation:  # 2.5 would be the key of 2
+            raise UnknownObservation(f"observation {_shown(observation)} is no integer: expected a member of {space}.")
+        return number
+
+    return key
 
 
 @key_of.register
@@ -208,14 +261,8 @@ def _(space: spaces.Discrete, keys: list[Any]) -> np.ndarray:
 
 
 @numbers_of_keys.register
-def _(space: spaces.Tuple, keys: list[Any]) -> np.ndarray:
-    columns = zip(space.spaces, zip(*keys, strict=True), strict=True)
-    return np.concatenate([numbers_of_keys(part, list(column)) for part, column in columns], axis=1)
-
-
-@numbers_of_keys.register
-def _(space: spaces.Dict, keys: list[Any]) -> np.ndarray:
-    columns = zip(space.spaces.values(), zip(*keys, strict=True), strict=True)
+def _(space: spaces.Tuple | spaces.Dict, keys: list[Any]) -> np.ndarray:
+    columns = zip(_parts(space), zip(*keys, strict=True), strict=True)
     return np.concatenate([numbers_of_keys(part, list(column)) for part, column in columns], axis=1)
 
 
@@ -231,20 +278,8 @@ def _(space: spaces.Discrete, numbers: np.ndarray) -> list[Any]:
 
 
 @keys_of_numbers.register
-def _(space: spaces.Tuple, numbers: np.ndarray) -> list[Any]:
-    return _keys_of_parts(space.spaces, numbers)
-
-
-@keys_of_numbers.register
-def _(space: spaces.Dict, numbers: np.ndarray) -> list[Any]:
-    return _keys_of_parts(space.spaces.values(), numbers)
-
-
-def _keys_of_parts(parts: Iterable[spaces.Space], numbers: np.ndarray) -> list[Any]:
-    parts = list(parts)
-    ends = np.cumsum([len(ranges(part)) for part in parts])[:-1]
-    columns = [keys_of_numbers(part, one) for part, one in zip(parts, np.split(numbers, ends, axis=1), strict=True)]
-    return list(zip(*columns, strict=True))
+def _(space: spaces.Tuple | spaces.Dict, numbers: np.ndarray) -> list[Any]:
+    return list(zip(*[keys_of_numbers(part, columns) for part, columns in _columns(space, numbers)], strict=True))
 
 
 def checked_members(space: spaces.Space, numbers: np.ndarray) -> np.ndarray:
@@ -254,7 +289,7 @@ def checked_members(space: spaces.Space, numbers: np.ndarray) -> np.ndarray:
         UnknownObservation: naming the first that is not.
     """
     low, count = ranges(space).T
-    wrong = np.flatnonzero(((numbers < low) | (numbers >= low + count)).any(axis=1))
+    wrong = np.flatnonzero(((numbers < low) | (numbers > low + (count - 1))).any(axis=1))  # low + count may wrap around
     if wrong.size:
         values = numbers[wrong[0]].tolist()
         raise UnknownObservation(

@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.errors import InvalidMDP, UnknownObservation
+from irl_gym.integer_spaces import ranges
 from irl_gym.states import Numbering
 
 
@@ -21,7 +22,8 @@ class ListedStates(Numbering):
     """A one-to-one map between some observations of a space and the rows of a table.
 
     Raises:
-        InvalidMDP: no state, or numbers that are not strictly increasing.
+        InvalidMDP: no state, numbers that are not strictly increasing or not as many as the space's observations have, or
+            terminal copies that do not stand behind the ordinary rows.
     """
 
     space: spaces.Space
@@ -37,6 +39,9 @@ class ListedStates(Numbering):
             raise InvalidMDP(
                 f"numbers have shape {numbers.shape} and dtype {numbers.dtype}: expected (n, k) integers, n at least 1."
             )
+        width = len(ranges(self.space))
+        if numbers.shape[1] != width:
+            raise InvalidMDP(f"numbers have shape {numbers.shape}: expected (n, {width}), as many as {self.space} has.")
         different = numbers[1:] != numbers[:-1]
         first = different.argmax(axis=1)
         rows = np.arange(len(first))
@@ -46,10 +51,11 @@ class ListedStates(Numbering):
                 f"numbers of row {unordered[0] + 1} are {numbers[unordered[0] + 1].tolist()}: expected more than the row "
                 "before, in lexicographic order. Sort them, each once."
             )
-        small = np.min_scalar_type(numbers.min()), np.min_scalar_type(numbers.max())
-        compact = numbers.astype(np.result_type(*small))
+        small = np.result_type(np.min_scalar_type(numbers.min()), np.min_scalar_type(numbers.max()))
+        compact = numbers.astype(np.int64 if small.kind == "f" else small)  # NumPy joins int8 and uint64 to a float
         compact.setflags(write=False)
         object.__setattr__(self, "numbers", compact)
+        self.check_copies()
 
     @property
     def n_ordinary(self) -> int:

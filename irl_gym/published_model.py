@@ -30,19 +30,24 @@ def model_table(env: gym.Env, gamma: float) -> Tabulation | None:
         return None
     S, A = int(base.observation_space.n), int(base.action_space.n)
     columns: list[list[np.ndarray]] = [[], [], [], []]
-    worst = 0.0
+    totals: list[float] = []
     for s in range(S):
         for a in range(A):
             successors, rewards, ended, probabilities = (np.asarray(part) for part in base.model(s, a))
             if ended.any():
                 return None
-            worst = max(worst, abs(float(probabilities.sum()) - 1))
-            parts = np.full(successors.size, s * A + a), successors, probabilities / probabilities.sum(), rewards
+            totals.append(float(probabilities.sum()))
+            parts = np.full(successors.size, s * A + a), successors, probabilities, rewards
             for column, part in zip(columns, parts, strict=True):
                 column.append(part)
-    if worst > NEARLY_ONE:
-        raise NotTabular(f"a row of the model sums to 1 within {worst:.2g} only: expected 1 within {NEARLY_ONE}.")
+    off = np.abs(np.array(totals) - 1)
+    wrong = np.flatnonzero(~(off <= NEARLY_ONE))  # NaN too
+    if wrong.size:
+        s, a = divmod(int(wrong[0]), A)
+        raise NotTabular(f"the probabilities of model({s}, {a}) sum to {totals[wrong[0]]:.6g}: expected 1 within {NEARLY_ONE}.")
+    worst = off.max()
     rows, successors, probabilities, rewards = (np.concatenate(column) for column in columns)
+    probabilities = probabilities / np.array(totals)[rows]
     d0 = np.zeros(S)
     for start in base._starts:  # a tuple, from which reset draws uniformly
         d0[base.encode(start)] += 1 / len(base._starts)

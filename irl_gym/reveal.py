@@ -52,7 +52,7 @@ KNOWN: Mapping[type[gym.Env], Mapping[str, Hidden]] = {
 def known_hidden(env: gym.Env) -> Mapping[str, int]:
     """What is known to be hidden in an environment and is not shown yet: name -> number of values; empty if nothing is."""
     base = env.unwrapped
-    shown = {name for layer in _layers(env) if isinstance(layer, Reveal) for name in layer.shown}
+    shown = {name for layer in layers(env) if isinstance(layer, Reveal) for name in layer.shown}
     return {name: hidden.n for name, hidden in _known(base).items() if hidden.when(base) and name not in shown}
 
 
@@ -106,7 +106,7 @@ def _known(base: gym.Env) -> Mapping[str, Hidden]:
     return next((KNOWN[kind] for kind in type(base).__mro__ if kind in KNOWN), {})
 
 
-def _layers(env: gym.Env) -> Iterator[gym.Env]:
+def layers(env: gym.Env) -> Iterator[gym.Env]:
     """The environment and its wrappers, from the outermost."""
     while isinstance(env, gym.Wrapper):
         yield env
@@ -117,10 +117,10 @@ def _layers(env: gym.Env) -> Iterator[gym.Env]:
 def _attribute(env: gym.Env, name: str) -> Any:
     """The attribute of a dotted name: of the environment itself, else of the innermost wrapper that has it."""
     head, *rest = name.split(".")
-    layers = [*_layers(env)][::-1]
-    value: Any = next((layer for layer in layers if hasattr(layer, head)), None)
+    inside_out = [*layers(env)][::-1]
+    value: Any = next((layer for layer in inside_out if hasattr(layer, head)), None)
     if value is None:
-        raise _no_attribute(type(env.unwrapped).__name__, head, layers)
+        raise _no_attribute(type(env.unwrapped).__name__, head, inside_out)
     for part in (head, *rest):
         if not hasattr(value, part):
             raise _no_attribute(type(value).__name__, part, [value])
@@ -132,8 +132,10 @@ def _no_attribute(owner: str, name: str, objects: list[Any]) -> InvalidParameter
     """The error of a name that is not there, with the names that are close, or else all."""
     found = {key for each in objects for key, value in getattr(each, "__dict__", {}).items()
              if isinstance(value, numbers.Integral | np.bool_)}  # fmt: skip
-    close = difflib.get_close_matches(name, sorted(found), n=3, cutoff=0.5) or sorted(found)[:9]
-    offer = f"The integer attributes closest to it are {', '.join(close)}." if close else "It has no integer attributes."
+    close = difflib.get_close_matches(name, sorted(found), n=3, cutoff=0.5)
+    some = sorted(found, key=lambda one: (one.startswith("_"), one))[:9]
+    offer = f"Its integer attributes are {', '.join(some)}." if some else "It has no integer attributes."
+    offer = f"The integer attributes closest to it are {', '.join(close)}." if close else offer
     return InvalidParameter(f"{owner} has no attribute {name!r}: expected the name of an integer or boolean one. {offer}")
 
 

@@ -50,7 +50,8 @@ class SeededStarts(gym.Wrapper, gym.utils.RecordConstructorArgs):
         if seed is None:
             before = base.np_random
         else:
-            of_choice, of_steps = np.random.SeedSequence(_checked_seeds([seed])[0]).spawn(2)
+            _check_seed("seed", seed)
+            of_choice, of_steps = np.random.SeedSequence(int(seed)).spawn(2)
             self.chooser, before = np.random.default_rng(of_choice), np.random.default_rng(of_steps)
         chosen = 0 if len(self.seeds) == 1 else int(self.chooser.integers(len(self.seeds)))
         result = self.env.reset(seed=self.seeds[chosen], options=options)
@@ -59,11 +60,15 @@ class SeededStarts(gym.Wrapper, gym.utils.RecordConstructorArgs):
 
 
 def _checked_seeds(seeds: Any) -> tuple[int, ...]:
-    if isinstance(seeds, str | bytes) or not isinstance(seeds, Sequence | np.ndarray):
+    if isinstance(seeds, str | bytes) or not isinstance(seeds, Sequence | np.ndarray) or not getattr(seeds, "ndim", 1):
         raise InvalidParameter(f"seeds is {seeds!r}: expected a list of whole numbers, such as [0, 1, 2].")
     if not len(seeds):
         raise InvalidParameter("seeds is empty: expected at least one whole number. One seed is one layout.")
     for i, seed in enumerate(seeds):
-        if isinstance(seed, bool) or not isinstance(seed, numbers.Integral) or seed < 0:
-            raise InvalidParameter(f"seeds[{i}] is {seed!r}: expected a whole number from 0, as `reset(seed=...)` takes.")
+        _check_seed(f"seeds[{i}]", seed)
     return tuple(int(seed) for seed in seeds)
+
+
+def _check_seed(name: str, seed: Any) -> None:
+    if isinstance(seed, bool) or not isinstance(seed, numbers.Integral) or seed < 0:
+        raise InvalidParameter(f"{name} is {seed!r}: expected a whole number from 0, as `reset(seed=...)` takes.")

@@ -59,9 +59,18 @@ class Shards:
         return self.folder / f"{number:06}.npz"
 
     def append(self, episodes: Sequence[Episode]) -> None:
-        """Write some episodes; none for none."""
+        """Write some episodes; none for none.
+
+        Raises:
+            InvalidDemonstrations: a seed that 64 bits do not hold, or observations that are no numbers and no text.
+        """
         if not episodes:
             return
+        for i, one in enumerate(episodes):
+            if one.seed is not None and not 0 <= one.seed < 2**63:
+                raise InvalidDemonstrations(
+                    f"episode {self.n_episodes + i} has seed {one.seed}: expected 0 to 2^63 - 1, or None."
+                )
         columns = {
             "lengths": np.array([len(one) for one in episodes]),
             "terminated": np.array([one.terminated for one in episodes]),
@@ -72,6 +81,9 @@ class Shards:
         }
         parts = [dict(_parts(self.space, one.observations)) for one in episodes]
         columns.update({name: np.concatenate([one[name] for one in parts]) for name in parts[0]})
+        objects = [name for name, column in columns.items() if column.dtype.hasobject]
+        if objects:  # np.savez would pickle them, and nothing is unpickled
+            raise InvalidDemonstrations(f"{objects[0]} are Python objects: expected numbers or text, as of {self.space}.")
         self.folder.mkdir(exist_ok=True)
         beside = self.folder / _BESIDE
         np.savez(beside, **columns)

@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.errors import NotDiscrete, UnknownObservation
+from irl_gym.errors import InvalidMDP, InvalidParameter, NotDiscrete, UnknownObservation
 from irl_gym.integer_spaces import as_batch, checked_members, first_of, from_numbers, is_batch, ranges, to_numbers
 
 
@@ -77,13 +77,26 @@ class Numbering:
         """(N, k) numbers of ordinary rows."""
         raise NotImplementedError
 
+    def check_copies(self) -> None:
+        """Check that terminal copies are of ordinary rows, one each, and fill the rows behind those.
+
+        Raises:
+            InvalidMDP: they are not.
+        """
+        last, copies = self.n_ordinary - 1, self.terminal_copies
+        for row in copies:
+            if not 0 <= row <= last:
+                raise InvalidMDP(f"terminal_copies has row {row}: expected ordinary rows, 0 to {last}.")
+        if sorted(copies.values()) != list(range(last + 1, self.n_states)):
+            raise InvalidMDP(
+                f"terminal_copies leads to rows {sorted(copies.values())[:9]}: expected {last + 1} to {self.n_states - 1}, "
+                "each once: they stand behind the ordinary ones."
+            )
+
     @cached_property
     def _originals(self) -> np.ndarray:
-        """Row -> row of the ordinary state (itself, but for terminal copies)."""
-        rows = np.arange(self.n_states)
-        for row, copy in self.terminal_copies.items():
-            rows[copy] = row
-        return rows
+        """(C,) rows of the ordinary states that the terminal copies are of, in the order of the copies."""
+        return np.array(sorted(self.terminal_copies, key=self.terminal_copies.__getitem__), dtype=np.int64)
 
     @cached_property
     def _ended(self) -> np.ndarray:
@@ -126,15 +139,41 @@ class Numbering:
         """
         rows = self.rows_of(checked_members(self.space, to_numbers(self.space, observations)))
         if terminated is not None and self.terminal_copies:
+            if np.shape(terminated) != rows.shape:
+                raise UnknownObservation(
+                    f"terminated has shape {np.shape(terminated)}: expected {rows.shape}, a boolean an observation."
+                )
             rows = np.where(terminated, self._ended[rows], rows)
         return rows
 
     def decode_batch(self, rows: Any) -> Any:
-        """The observations of rows, stacked as vector environments stack them."""
-        return from_numbers(self.space, self.numbers_of(self._originals[np.asarray(rows)]))
+        """The observations of rows (N,), stacked as vector environments stack them.
+
+        Raises:
+            InvalidParameter: anything but rows of the table.
+        """
+        rows = self._checked_rows(rows)
+        copies = rows >= self.n_ordinary
+        if copies.any():
+            rows = rows.copy()
+            rows[copies] = self._originals[rows[copies] - self.n_ordinary]
+        return from_numbers(self.space, self.numbers_of(rows))
+
+    def _checked_rows(self, rows: Any) -> np.ndarray:
+        found = np.asarray(rows) if np.size(rows) else np.zeros(np.shape(rows), dtype=np.int64)
+        if found.ndim != 1 or found.dtype.kind not in "iu":
+            raise InvalidParameter(f"rows have shape {found.shape} and dtype {found.dtype}: expected (N,) integers.")
+        wrong = np.flatnonzero((found < 0) | (found >= self.n_states))
+        if wrong.size:
+            raise InvalidParameter(f"row {found[wrong[0]]} is outside the table: expected 0 to {self.n_states - 1}.")
+        return found.astype(np.int64)
 
     def decode(self, row: int) -> Any:
-        """The observation of a row."""
+        """The observation of a row.
+
+        Raises:
+            InvalidParameter: no row of the table.
+        """
         return first_of(self.space, self.decode_batch(np.array([row])))
 
 
@@ -144,6 +183,7 @@ class StateIndex(Numbering):
 
     Raises:
         NotDiscrete: the space is not made of integers, or has more elements than 64-bit integers can number.
+        InvalidMDP: terminal copies that do not stand behind the ordinary rows.
     """
 
     space: spaces.Space
@@ -156,6 +196,7 @@ class StateIndex(Numbering):
             raise NotDiscrete(
                 f"{self.space} has more than 2^62 elements: too many to number. Number those that occur, with ListedStates."
             )
+        self.check_copies()
 
     @cached_property
     def _ranges(self) -> np.ndarray:

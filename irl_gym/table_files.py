@@ -3,15 +3,17 @@
 The observation space is not kept: who reads the file gives it, and it is compared.
 """
 
+import errno
 import json
 import os
+import struct
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
-from irl_gym.errors import InvalidMDP
+from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import UNREADABLE, TabularReward, plain_json
@@ -21,6 +23,8 @@ from irl_gym.tabulation import Evidence, Tabulation
 
 TABLE = "table.npz"
 """The table in the folder of a run."""
+DAMAGE = (*UNREADABLE, LookupError, RuntimeError, struct.error)
+"""What reading raises of a file that is damaged: zipfile takes a changed bit for encryption, too."""
 UNDER_WAY = ".enumeration.tmp.npz"
 """An enumeration that is not finished, there."""
 
@@ -33,7 +37,11 @@ def keep_table(table: Tabulation, folder: Path) -> None:
 
 
 def kept_table(folder: Path, space: spaces.Space) -> Tabulation | None:
-    """The table that a folder keeps; None where there is none that can be read, and it has to be made again."""
+    """The table that a folder keeps; None where there is none, and where it was damaged or another's and is now deleted.
+
+    Raises:
+        InvalidParameter: a file that cannot be opened now; it stays.
+    """
     try:
         return load_table(folder / TABLE, space)
     except FileNotFoundError:
@@ -81,6 +89,7 @@ def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
     Raises:
         FileNotFoundError: no such file.
         InvalidMDP: a file that holds no table, or one of other observations.
+        InvalidParameter: a file that cannot be opened now, which says nothing about what is in it.
     """
     path = Path(path)
     if not path.exists():
@@ -91,9 +100,11 @@ def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
         if str(found["space"]) != str(space):
             raise InvalidMDP(f"{path} holds a table of observations {found['space']}: expected {space}. Is it another one's?")
         return _rebuilt(found, space)
-    except (*UNREADABLE, LookupError) as error:
-        if isinstance(error, InvalidMDP):
-            raise
+    except InvalidMDP:
+        raise
+    except DAMAGE as error:
+        if isinstance(error, OSError) and error.errno != errno.EINVAL:  # zipfile sought a place before the file's start
+            raise InvalidParameter(f"{path} cannot be read now ({error}): expected a table. Ask again when it can.") from error
         raise InvalidMDP(f"{path} holds no table ({error}): expected what `save_table` writes.") from error
 
 
@@ -106,6 +117,8 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
     payments = Payments(found["mean"], found["deviation"], entries, float(found["largest"]))
     copies = {int(row): int(copy) for row, copy in found["copies"]}
     states = ListedStates(space, found["numbers"], copies) if found["numbers"].size else StateIndex(space, copies)
+    if states.n_states != mdp.n_states:
+        raise InvalidMDP(f"the table has {mdp.n_states} states and a numbering of {states.n_states}: expected as many.")
     evidence = json.loads(str(found["evidence"]))
     check = None if evidence["check"] is None else SelfCheck(**evidence["check"])
     reward = TabularReward(found["reward"], {"source": "environment"})

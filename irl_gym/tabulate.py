@@ -25,6 +25,7 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.published_model import model_table
 from irl_gym.published_table import published_table
+from irl_gym.reveal import layers
 from irl_gym.rewards import TabularReward
 from irl_gym.selfcheck import compare_with_steps
 from irl_gym.states import StateIndex
@@ -136,7 +137,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             ) from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
             raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
-        known = {id.rpartition(":")[2]: id for id in (*gym.registry, *OWN_ENVIRONMENTS)}
+        known = {one.rpartition(":")[2]: one for one in (*gym.registry, *OWN_ENVIRONMENTS)}
         close = [known[match] for match in difflib.get_close_matches(name, known, n=3, cutoff=0.5)]
         offer = f" The closest are {', '.join(close)}." if close else ""
         if name.startswith(("MiniGrid-", "BabyAI-")):
@@ -162,6 +163,7 @@ def _check_flags(env: gym.Env, kwargs: dict[str, Any]) -> None:
     known = inspect.signature(type(env.unwrapped).__init__).parameters
     for name, value in kwargs.items():
         if isinstance(value, str) and name in known and isinstance(known[name].default, bool):
+            env.close()
             raise InvalidParameter(f"{name} is {value!r}: expected true or false, as its default {known[name].default}.")
 
 
@@ -171,9 +173,8 @@ def _learned_reward(env: gym.Env) -> LearnedReward | None:
     Raises:
         NotTabular: a wrapper around it that changes what it pays.
     """
-    wrapper: Any = env
     outside = []
-    while isinstance(wrapper, gym.Wrapper):
+    for wrapper in layers(env):
         if isinstance(wrapper, LearnedReward):
             if outside:
                 raise NotTabular(
@@ -181,20 +182,15 @@ def _learned_reward(env: gym.Env) -> LearnedReward | None:
                     "but for wrappers that only watch or limit. Put it inside."
                 )
             return wrapper
-        if not only_watches(wrapper):
+        if isinstance(wrapper, gym.Wrapper) and not only_watches(wrapper):
             outside.append(type(wrapper).__name__)
-        wrapper = wrapper.env
     return None
 
 
 def _plain(env: gym.Env) -> bool:
     """Is the environment what its base is, but for wrappers that watch, and LearnedReward?"""
-    wrapper: Any = env
-    while isinstance(wrapper, gym.Wrapper):
-        if not isinstance(wrapper, LearnedReward) and not only_watches(wrapper):
-            return False
-        wrapper = wrapper.env
-    return True
+    wrappers = (layer for layer in layers(env) if isinstance(layer, gym.Wrapper))
+    return all(isinstance(wrapper, LearnedReward) or only_watches(wrapper) for wrapper in wrappers)
 
 
 def _published(env: gym.Env, gamma: float) -> Tabulation | None:

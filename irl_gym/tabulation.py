@@ -67,13 +67,15 @@ def payments_of(table: TransitionTable, reward: RewardFunction) -> Payments:
     rows = entry_rows(table.P)
     states, actions = np.divmod(rows, table.n_actions)
     paid = np.asarray(reward.pay(states, actions, table.P.indices), dtype=np.float64)
-    mean, deviation = moments(rows, table.P.data, paid, (table.n_states, table.n_actions))
+    mean, deviation = moments(rows, table.P.data, paid, paid**2, (table.n_states, table.n_actions))
     return Payments(mean, deviation, paid, float(np.abs(paid).max(initial=0.0)))
 
 
-def moments(rows: np.ndarray, p: np.ndarray, r: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """(S, A) mean and standard deviation of what a step pays, from lines of row, probability and reward."""
-    R, square = (np.bincount(rows, weights=p * moment, minlength=shape[0] * shape[1]).reshape(shape) for moment in (r, r**2))
+def moments(
+    rows: np.ndarray, p: np.ndarray, r: np.ndarray, squares: np.ndarray, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(S, A) mean and standard deviation of what a step pays, from lines of row, probability, mean reward and mean square."""
+    R, square = (np.bincount(rows, weights=p * one, minlength=shape[0] * shape[1]).reshape(shape) for one in (r, squares))
     variance = square - R**2
     return R, np.sqrt(np.where(variance > 1e-12 * square, variance, 0.0))
 
@@ -97,7 +99,7 @@ def from_lines(lines: Lines, d0: np.ndarray, n_actions: int, states: States, *, 
     rows, p, r = lines.rows, lines.probabilities, lines.rewards
     shape = (states.n_states * n_actions, states.n_states)
     mdp = TabularMDP(sp.coo_array((p, (rows, lines.successors)), shape=shape), gamma, d0)
-    R, deviation = moments(rows, p, r, (states.n_states, n_actions))
+    R, deviation = moments(rows, p, r, r**2, (states.n_states, n_actions))
     paid = _entry_rewards(mdp.P, rows, lines.successors, p, r)
     payments = Payments(R, deviation, paid, float(np.abs(r).max(initial=0.0)))
     evidence = replace(evidence, merged=rows.size - mdp.P.nnz)

@@ -20,6 +20,8 @@ BLOCK = 10_000
 """Steps read at a time; fewer where an observation has many numbers."""
 NUMBERS = 1 << 22
 """Numbers of observations read at a time: 32 MB."""
+LARGEST = 1e150
+"""|reward| up to which its square is finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +55,9 @@ def tally(episodes: Iterable[Episode], space: spaces.Space, n_actions: int) -> T
 
     Raises:
         NotDiscrete: observations that are not integers.
-        InvalidDemonstrations: no episode; an action out of range or a reward that is not finite, with its episode and step.
-        UnknownObservation: an observation outside the space.
+        InvalidDemonstrations: no episode; an action out of range, or a reward that is not finite or beyond 1e150, with its
+            episode and step.
+        UnknownObservation: an observation outside the space, with its episode.
     """
     found = _Found(space, n_actions)
     for block in _blocks(episodes, len(ranges(space))):
@@ -91,7 +94,7 @@ class _Found:
         """Count some episodes."""
         lengths = np.array([len(episode) for episode in block])
         actions, rewards = self._checked(block, lengths)
-        ids = self._ids(np.concatenate([self._numbers(episode, i) for i, episode in enumerate(block)]))
+        ids = self._ids(self._numbers(block))
         lasts = np.cumsum(lengths + 1) - 1
         firsts = lasts - lengths
         done = np.zeros(ids.size, dtype=bool)
@@ -104,28 +107,38 @@ class _Found:
         self._add_lines(pairs, arrivals, rewards)
         self.n_episodes += len(block)
 
-    def _numbers(self, episode: Episode, i: int) -> np.ndarray:
+    def _numbers(self, block: list[Episode]) -> np.ndarray:
+        """(N, k) the observations of some episodes, one after the other."""
         try:
-            return to_numbers(self.space, episode.observations)
-        except UnknownObservation as error:
-            raise UnknownObservation(f"in episode {self.n_episodes + i}, {error}") from error
+            return checked_members(self.space, np.concatenate([to_numbers(self.space, one.observations) for one in block]))
+        except UnknownObservation:
+            for i, episode in enumerate(block):  # each alone, to name the one that is wrong
+                try:
+                    checked_members(self.space, to_numbers(self.space, episode.observations))
+                except UnknownObservation as error:
+                    raise UnknownObservation(f"in episode {self.n_episodes + i}, {error}") from error
+            raise
 
     def _checked(self, block: list[Episode], lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        actions = np.concatenate([episode.actions for episode in block]).astype(np.int64)
+        # Cast before they are joined: NumPy joins signed and unsigned integers to floats.
+        actions = np.concatenate([episode.actions.astype(np.int64) for episode in block])
         rewards = np.concatenate([np.asarray(episode.rewards, dtype=np.float64) for episode in block])
         wrong = (actions < 0) | (actions >= self.n_actions)
-        if wrong.any() or not np.isfinite(rewards).all():
-            at = int(np.argmax(wrong | ~np.isfinite(rewards)))
+        unpaid = ~(np.abs(rewards) <= LARGEST)  # NaN too
+        if wrong.any() or unpaid.any():
+            at = int(np.argmax(wrong | unpaid))
             i = int(np.searchsorted(np.cumsum(lengths), at, side="right"))
             where = f"episode {self.n_episodes + i}, step {at - int(lengths[:i].sum())}"
             if wrong[at]:
                 raise InvalidDemonstrations(f"{where} takes action {actions[at]}: expected 0 to {self.n_actions - 1}.")
-            raise InvalidDemonstrations(f"{where} pays {rewards[at]}: expected a finite reward. Mend or leave out the episode.")
+            limit = f", {LARGEST:.0e} at most" if np.isfinite(rewards[at]) else ""
+            raise InvalidDemonstrations(
+                f"{where} pays {rewards[at]}: expected a finite reward{limit}. Mend or leave out the episode."
+            )
         return actions, rewards
 
     def _ids(self, numbers: np.ndarray) -> np.ndarray:
         """(N,) the places of observations in the order in which they came."""
-        checked_members(self.space, numbers)
         raw = np.ascontiguousarray(numbers)
         keys, place = np.unique(raw.view(np.dtype((np.void, raw.dtype.itemsize * raw.shape[1]))).ravel(), return_inverse=True)
         known = [self.states.setdefault(key, len(self.states)) for key in keys.tolist()]

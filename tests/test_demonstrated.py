@@ -161,3 +161,9 @@ def test_levels_and_concentrations_outside_their_range_are_refused(function, wro
 def test_intervals_refuse_a_single_action():
     with pytest.raises(InvalidParameter, match="one action"):
         intervals(EmpiricalPolicy(np.array([[3]])))
+
+
+@pytest.mark.parametrize("counts", [np.full((1, 3), 2**62), np.array([[2**63, 1]], dtype=np.uint64)])
+def test_counts_too_large_to_add_up_are_refused(counts):
+    with pytest.raises(InvalidDemonstrations, match=r"the counts of a state add up to .*: expected less than 2\^63"):
+        maximum_likelihood(EmpiricalPolicy(counts))

@@ -1,6 +1,7 @@
 """An export is killed at every moment and ends in the dataset that it would have ended in."""
 
 import contextlib
+import itertools
 import os
 import signal
 import sys
@@ -14,7 +15,7 @@ import pytest
 from irl_gym import export
 from irl_gym.datasets import described, minari_root, read_minari
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import DatasetExists, InvalidParameter, RunConflict
+from irl_gym.errors import DatasetExists, InvalidDemonstrations, InvalidParameter, RunConflict
 from irl_gym.export import Amount, export_dataset
 
 ID = "lake/some/expert-v0"
@@ -269,3 +270,18 @@ def test_memory_does_not_grow_with_the_number_of_episodes(tmp_path, monkeypatch)
 
     peak(2)  # what is made once
     assert peak(240) < peak(40) + 1_000_000  # of 48 kB each
+
+
+def test_amounts_and_plans_of_numpy_are_taken(tmp_path, unchecked):
+    made = run(tmp_path, amount=Amount(episodes=np.int64(2)), plan={"seed": np.int64(3), "epsilon": np.float32(0.5)})
+    assert made.total_episodes == 2
+
+
+def test_a_demonstrator_that_ends_too_early_is_refused_and_what_it_gave_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(export, "SHARD_BYTES", 1 << 20)
+    few = Numbered()
+    monkeypatch.setattr(few, "episodes", lambda first: itertools.islice(Numbered().episodes(first), 3))
+    with pytest.raises(InvalidDemonstrations, match="the demonstrator ended after episode 2: expected episodes without end"):
+        run(tmp_path, few)
+    rest = Numbered()
+    assert run(tmp_path, rest).total_episodes == 7 and rest.asked[0] == 3

@@ -142,3 +142,9 @@ def test_a_file_that_holds_no_expert_is_refused(toy_text, tmp_path, name):
     (tmp_path / name).write_text("nothing")
     with pytest.raises(InvalidParameter, match="holds no expert"):
         FromFile.at(str(tmp_path / name)).plan(lake(toy_text), gamma=0.9)
+
+
+@pytest.mark.parametrize("path", [None, 5, ""])
+def test_what_is_no_path_is_refused(unchecked, path):
+    with pytest.raises(InvalidParameter, match="which is no file"):
+        FromFile.at(path)

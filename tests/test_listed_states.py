@@ -139,3 +139,19 @@ def test_members_of_a_space_are_checked():
 def test_a_key_refuses_floats():
     with pytest.raises(UnknownObservation, match="float64"):
         key_of(spaces.MultiBinary(2))(np.array([0.0, 1.0]))
+
+
+def test_numbers_of_another_space_are_refused():
+    with pytest.raises(InvalidMDP, match=r"numbers have shape \(1, 2\): expected \(n, 1\), as many as Discrete\(4\) has"):
+        ListedStates(spaces.Discrete(4), np.array([[0, 1]]))
+
+
+def test_negative_and_very_large_numbers_stay_integers():
+    numbers = np.array([[-1], [2**60 + 1]])
+    states = ListedStates(spaces.Box(-1, 2**61, (1,), np.int64), numbers)
+    assert states.numbers_of(np.array([0, 1])).tolist() == numbers.tolist() and states.numbers.dtype == np.int64
+
+
+def test_terminal_copies_that_do_not_stand_behind_the_rows_are_refused():
+    with pytest.raises(InvalidMDP, match="terminal_copies leads to rows"):
+        ListedStates(spaces.Discrete(4), np.array([[0], [3]]), {0: 3})

@@ -195,7 +195,7 @@ def test_an_unknown_part_is_refused_after_the_dot():
 
 def test_all_integer_attributes_are_offered_when_none_is_close():
     env = Reveal(Counter(), {"zzz": 5})
-    with pytest.raises(InvalidParameter, match="are count, first, limit, odd"):
+    with pytest.raises(InvalidParameter, match="Its integer attributes are count, first, limit, odd"):
         env.reset()
 
 

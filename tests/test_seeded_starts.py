@@ -142,3 +142,13 @@ def test_an_array_of_seeds_is_a_list_of_them():
 def test_a_negative_seed_of_a_reset_is_refused():
     with pytest.raises(InvalidParameter, match=r"-1: expected a whole number from 0"):
         SeededStarts(Layouts()).reset(seed=-1)
+
+
+def test_a_seed_in_no_list_is_refused(unchecked):
+    with pytest.raises(InvalidParameter, match=r"seeds is array\(3\): expected a list"):
+        SeededStarts(Layouts(), np.array(3))  # type: ignore[arg-type]
+
+
+def test_the_seed_of_a_reset_is_called_so():
+    with pytest.raises(InvalidParameter, match=r"^seed is -1: expected a whole number from 0"):
+        SeededStarts(Layouts(), [3, 4]).reset(seed=-1)

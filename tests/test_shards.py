@@ -90,3 +90,17 @@ def test_nothing_is_written_for_no_episodes(tmp_path):
 
 def test_an_episodes_size_counts_every_part():
     assert size_of(SPACE, episode(3)) == 3 * 16 + 4 * (8 + 2 + 3 * 8)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_that_would_come_back_as_another_is_refused(shards, seed):
+    with pytest.raises(InvalidDemonstrations, match=f"episode 4 has seed {seed}: expected 0 to"):
+        shards.append([episode(2), episode(2, seed=seed)])
+
+
+def test_objects_are_refused_and_nothing_is_pickled(tmp_path):
+    graphs = Shards(tmp_path / "shards", spaces.Sequence(spaces.Discrete(3)))
+    made = Episode(np.array([None, {}, ()], dtype=object), np.array([0, 1]), np.zeros(2), True, False)
+    with pytest.raises(InvalidDemonstrations, match="observations are Python objects: expected numbers or text"):
+        graphs.append([made])
+    assert not graphs.folder.exists()

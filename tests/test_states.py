@@ -7,7 +7,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irl_gym.errors import NotDiscrete, UnknownObservation
+from irl_gym.errors import InvalidMDP, InvalidParameter, NotDiscrete, UnknownObservation
 from irl_gym.states import StateIndex, States
 
 small = st.integers(1, 4)
@@ -175,3 +175,43 @@ def test_encode_names_the_observation_that_is_outside():
 
 def test_state_index_offers_the_interface_of_states():
     assert isinstance(StateIndex(spaces.Discrete(3)), States)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([5], "row 5 is outside the table: expected 0 to 4"),
+        ([2, -1], "row -1 is outside the table"),
+        (3, r"rows have shape \(\) and dtype int64: expected \(N,\) integers"),
+        ([1.0], "dtype float64"),
+        ([True], "dtype bool"),
+        ([[1]], r"shape \(1, 1\)"),
+    ],
+)
+def test_rows_that_are_not_the_tables_are_refused(rows, message):
+    with pytest.raises(InvalidParameter, match=message):
+        StateIndex(spaces.Discrete(4), {1: 4}).decode_batch(rows)
+
+
+def test_no_rows_are_no_observations():
+    assert StateIndex(spaces.MultiDiscrete([2, 3])).decode_batch([]).shape == (0, 2)
+
+
+def test_a_row_of_a_space_too_large_to_list_is_decoded():
+    assert StateIndex(spaces.MultiDiscrete([1000] * 6)).decode(5_003).tolist() == [0, 0, 0, 0, 5, 3]
+
+
+def test_terminal_copies_in_any_order_are_decoded():
+    index = StateIndex(spaces.Discrete(4), {3: 4, 1: 6, 2: 5})
+    assert index.decode_batch([4, 5, 6, 0]).tolist() == [3, 2, 1, 0]
+
+
+@pytest.mark.parametrize("copies", [{1: 9}, {1: 3}, {1: 4, 2: 4}, {9: 4}, {-1: 4}])
+def test_terminal_copies_that_do_not_stand_behind_the_rows_are_refused(copies):
+    with pytest.raises(InvalidMDP, match="terminal_copies"):
+        StateIndex(spaces.Discrete(4), copies)
+
+
+def test_as_many_ends_as_observations_are_expected():
+    with pytest.raises(UnknownObservation, match=r"terminated has shape \(2,\): expected \(3,\)"):
+        StateIndex(spaces.Discrete(4), {1: 4}).encode_batch([1, 2, 3], terminated=np.array([True, False]))

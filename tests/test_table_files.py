@@ -1,5 +1,6 @@
 """Tables as files: the same table comes back, and nothing else is read as one."""
 
+import errno
 import os
 import pickle
 from dataclasses import replace
@@ -13,8 +14,8 @@ from gymnasium import spaces
 from tiny_env import TableEnv, both_ways, lottery
 
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import InvalidMDP
-from irl_gym.table_files import load_table, save_table
+from irl_gym.errors import InvalidMDP, InvalidParameter
+from irl_gym.table_files import keep_table, kept_table, load_table, save_table
 from irl_gym.tabulate import tabulate
 
 
@@ -133,7 +134,6 @@ def test_a_file_that_is_not_there_is_missing(tmp_path):
 
 
 def test_states_of_another_numbering_are_refused(table, tmp_path, unchecked):
-
     other = replace(table("published"), states=object())
     with pytest.raises(InvalidMDP, match="the states are object: expected a StateIndex or ListedStates"):
         save_table(other, tmp_path / "table.npz")
@@ -165,6 +165,19 @@ def _one_array(path):
         np.save(file, np.arange(3))
 
 
+def _flagged_as_encrypted(path):
+    content = bytearray(path.read_bytes())
+    content[content.rindex(b"PK\x01\x02") + 8] |= 1
+    path.write_bytes(content)
+
+
+def _copies_added(path):
+    with np.load(path, allow_pickle=False) as kept:
+        parts = dict(kept)
+    with path.open("wb") as file:
+        np.savez(file, **parts | {"copies": np.array([[0, 16]])})
+
+
 DAMAGE = {
     "truncated": lambda path: path.write_bytes(path.read_bytes()[:-40]),
     "empty": lambda path: path.write_bytes(b""),
@@ -173,6 +186,7 @@ DAMAGE = {
     "a pickle inside": _pickled_inside,
     "a part missing": _without_evidence,
     "one array": _one_array,
+    "a bit": _flagged_as_encrypted,
 }
 
 
@@ -184,6 +198,28 @@ def test_a_file_that_holds_no_table_is_refused_and_never_unpickled(table, tmp_pa
     with pytest.raises(InvalidMDP, match="holds no table"):
         load_table(path, spaces.Discrete(16))
     assert not Path("unpickled").exists()
+
+
+def test_a_numbering_of_other_states_is_refused(table, tmp_path):
+    path = saved(table("published"), tmp_path / "table.npz")
+    _copies_added(path)
+    with pytest.raises(InvalidMDP, match="the table has 16 states and a numbering of 17"):
+        load_table(path, spaces.Discrete(16))
+
+
+def test_a_folder_forgets_a_table_that_is_damaged(table, tmp_path):
+    keep_table(table("published"), tmp_path)
+    _flagged_as_encrypted(tmp_path / "table.npz")
+    assert kept_table(tmp_path, spaces.Discrete(16)) is None and not list(tmp_path.iterdir())
+
+
+def test_a_table_that_cannot_be_opened_now_stays(table, tmp_path, monkeypatch):
+    keep_table(table("published"), tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", lambda *_, **__: (_ for _ in ()).throw(OSError(errno.EMFILE, "not now")))
+        with pytest.raises(InvalidParameter, match=r"table.npz cannot be read now \(.*not now\)"):
+            kept_table(tmp_path, spaces.Discrete(16))
+    assert kept_table(tmp_path, spaces.Discrete(16)) is not None
 
 
 def test_a_table_that_is_no_mdp_is_refused(table, tmp_path):

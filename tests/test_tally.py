@@ -42,10 +42,12 @@ def test_counts_do_not_depend_on_the_blocks_in_which_they_are_read(monkeypatch):
         ([], InvalidDemonstrations, "there are no episodes"),
         ([episode([0, 1], [0]), episode([0, 0, 1], [0, 7])], InvalidDemonstrations, "episode 1, step 1 takes action 7"),
         ([episode([0, 1], [0], [np.nan])], InvalidDemonstrations, "episode 0, step 0 pays nan"),
-        ([episode([0, 9], [0])], UnknownObservation, "observation 9 is outside"),
+        ([episode([0, 1], [0], [1e200])], InvalidDemonstrations, r"pays 1e\+200: expected a finite reward, 1e\+150 at most"),
+        ([episode([0, 1], np.array([2**63], np.uint64))], InvalidDemonstrations, "episode 0, step 0 takes action"),
+        ([episode([0, 1], [0]), episode([0, 9], [0])], UnknownObservation, "in episode 1, observation 9 is outside"),
         ([episode([0, 1], [0]), episode([0.0, 1.0], [0])], UnknownObservation, "in episode 1, .*float64"),
     ],
-    ids=["none", "action", "reward", "outside", "floats"],
+    ids=["none", "action", "reward", "large reward", "large action", "outside", "floats"],
 )
 def test_counting_refuses_episodes_that_cannot_be(episodes, error, message):
     with pytest.raises(error, match=message):

@@ -42,6 +42,17 @@ def checked_number(
     return number
 
 
+def checked_rng(rng: Any) -> np.random.Generator:
+    """Return a generator as it is.
+
+    Raises:
+        InvalidParameter: anything else, such as a seed.
+    """
+    if isinstance(rng, np.random.Generator):
+        return rng
+    raise InvalidParameter(f"rng is {rng!r}: expected a generator. Make one of a seed: `np.random.default_rng(0)`.")
+
+
 def float_array(name: str, value: Any, expected: str, error: type[InvalidInput]) -> np.ndarray:
     """Return an array-like as a new float64 array.
 
@@ -49,6 +60,8 @@ def float_array(name: str, value: Any, expected: str, error: type[InvalidInput])
         InvalidInput: of the class given, for anything that is not rows of numbers of one length.
     """
     try:
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers")  # NumPy would drop the imaginary part
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as reason:
         raise error(

@@ -22,8 +22,7 @@ from irl_gym.diagnoses.unfinished import left_behind, seen_with_noise
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import IRLResult
 from irl_gym.linear_reward import LinearReward
-from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.states import States
 

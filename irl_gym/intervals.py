@@ -8,12 +8,12 @@ Axes: N values, T tasks, n seeds.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import trim_mean
 
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import checked_number, checked_rng, float_array
 from irl_gym.errors import InvalidParameter
 
 LEVEL = 0.95
@@ -33,17 +33,6 @@ class Interval(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.estimate:.3f} ({self.low:.3f} to {self.high:.3f})"
-
-
-def checked_rng(rng: Any) -> np.random.Generator:
-    """Return a generator as it is.
-
-    Raises:
-        InvalidParameter: anything else, such as a seed.
-    """
-    if isinstance(rng, np.random.Generator):
-        return rng
-    raise InvalidParameter(f"rng is {rng!r}: expected a generator. Make one of a seed: `np.random.default_rng(0)`.")
 
 
 def interquartile_mean(values: np.ndarray) -> float:

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
 from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidDiscount, InvalidMDP
-from irl_gym.policies import as_distribution
+from irl_gym.policies import as_distribution, policy_array
 
 ROW_SUM_TOLERANCE = 1e-9
 
@@ -102,7 +102,7 @@ class TransitionTable:
 
     def mixing(self, policy: Any) -> Sparse:
         """(S, S*A) sparse matrix M with M[s, s * A + a] = policy(a | s): M @ P is P_pi, M @ R.ravel() is R_pi."""
-        array = np.asarray(policy)
+        array = policy_array(policy)
         if array.dtype.kind in "iu" and array.shape == (self.n_states,) and self.n_states:
             if array.min() >= 0 and array.max() < self.n_actions:  # the common case, without an (S, A) array
                 columns = np.arange(self.n_states) * self.n_actions + array
@@ -146,6 +146,17 @@ class TabularMDP(TransitionTable):
         if abs(P.sum() - self.P[stacked].sum()) > 1e-6 or abs(start.sum() - 1) > 1e-6:
             raise InvalidMDP(f"the {rows.size} states are not closed: an action or a start leads out of them.")
         return TabularMDP(P, self.gamma, start)
+
+
+def checked_mdp(mdp: Any) -> TabularMDP:
+    """Return a TabularMDP as it is.
+
+    Raises:
+        InvalidMDP: anything else, such as an environment or a whole Tabulation.
+    """
+    if isinstance(mdp, TabularMDP):
+        return mdp
+    raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
 
 
 def check_discount(gamma: float) -> float:

@@ -12,8 +12,8 @@ import numpy as np
 from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.checks import checked_number
 from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration, tied
-from irl_gym.errors import InvalidMDP, InvalidParameter
-from irl_gym.mdp import TabularMDP
+from irl_gym.errors import InvalidParameter
+from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
 
@@ -44,17 +44,6 @@ class Regret:
     """(S,) from each state on; 0 in terminal ones."""
     optimal: float
     """The optimal value from d0."""
-
-
-def checked_mdp(mdp: Any) -> TabularMDP:
-    """Return a TabularMDP as it is.
-
-    Raises:
-        InvalidMDP: anything else, such as an environment or a whole Tabulation.
-    """
-    if isinstance(mdp, TabularMDP):
-        return mdp
-    raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
 
 
 def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any, horizon: int | None = None) -> float:

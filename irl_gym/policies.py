@@ -42,10 +42,7 @@ def as_distribution(policy: Any, n_states: int, n_actions: int) -> Matrix:
     Raises:
         InvalidPolicy: wrong shape, action out of range, empty set, probabilities negative, NaN or not summing to 1.
     """
-    try:
-        array = np.asarray(policy)
-    except ValueError as error:
-        raise InvalidPolicy(f"policy cannot be read as an array ({error}): expected one entry for each state.") from error
+    array = policy_array(policy)
     if array.shape == (n_states,) and array.dtype.kind in "iu":
         return _one_hot(array, n_actions)
     if array.shape != (n_states, n_actions):
@@ -64,6 +61,20 @@ def as_distribution(policy: Any, n_states: int, n_actions: int) -> Matrix:
             "bool (a set). Convert it, for example with `policy.astype(bool)`."
         )
     return _checked_probabilities(array)
+
+
+def policy_array(policy: Any) -> np.ndarray:
+    """A policy as an array: that of a TabularPolicy, or what was given.
+
+    Raises:
+        InvalidPolicy: rows of several lengths.
+    """
+    if isinstance(policy, TabularPolicy):
+        return policy.probabilities
+    try:
+        return np.asarray(policy)
+    except ValueError as error:
+        raise InvalidPolicy(f"policy cannot be read as an array ({error}): expected one entry for each state.") from error
 
 
 def _one_hot(actions: np.ndarray, n_actions: int) -> np.ndarray:

@@ -153,7 +153,7 @@ def as_reward(reward: Any) -> TabularReward:
     Raises:
         InvalidReward: an array of another shape, or with values that are not finite.
     """
-    return reward if isinstance(reward, TabularReward) else TabularReward(np.asarray(reward))
+    return reward if isinstance(reward, TabularReward) else TabularReward(reward)
 
 
 def plain_json(value: Any) -> Any:

@@ -134,3 +134,8 @@ def test_a_policy_of_actions_is_not_taken_for_probabilities(unchecked):
 def test_a_policy_comes_back_from_pickle_immutable():
     again = pickle.loads(pickle.dumps(TabularPolicy(np.eye(3), StateIndex(spaces.Discrete(3)))))
     assert not again.probabilities.flags.writeable
+
+
+def test_a_tabular_policy_is_its_own_distribution():
+    policy = TabularPolicy(np.array([[0.25, 0.75], [1.0, 0.0]]), StateIndex(spaces.Discrete(2)))
+    assert as_distribution(policy, 2, 2) == pytest.approx(policy.probabilities)

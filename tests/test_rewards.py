@@ -181,3 +181,10 @@ def test_load_refuses_a_file_without_values(tmp_path):
 def test_as_reward_makes_a_table_of_an_array_and_leaves_one_as_it_is():
     made = as_reward(np.arange(3.0))
     assert isinstance(made, TabularReward) and as_reward(made) is made
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.parametrize(("given", "told"), [([[1.0, 2.0], [3.0]], "list that cannot be read"), (np.ones(3) * 1j, "complex")])
+def test_a_reward_that_is_no_array_of_real_numbers_is_refused(given, told):
+    with pytest.raises(InvalidReward, match=told):
+        as_reward(given)

@@ -17,14 +17,12 @@ import scipy.sparse as sp
 
 from irl_gym._typing import Indices, Matrix, Numbers, StateMask, Vector
 from irl_gym.certificate import least_per_state, row_margins, tolerated, violated_rows
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import checked_number, checked_rng, float_array
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.dynamic_programming import Discounted, policy_iteration
 from irl_gym.errors import InvalidParameter
-from irl_gym.intervals import checked_rng
 from irl_gym.learners.feature_rows import completed
-from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward, as_reward
 
 

@@ -27,12 +27,12 @@ from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
-from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward, read_archive, write_archive
 
 FORMAT = "irl_gym.LambdaPath/1"
 ARRAYS = ("breakpoints", "rewards", "margins", "l1_norms", "total_margins", "gaps")
+NUMBERS = ("gap", "exact", "r_max", "margin_cap", "solves")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +132,7 @@ class LambdaPath:
         return arrays | self._header() | {"lambda_0": self.lambda_0, "changes": [one.to_json() for one in self.changes]}
 
     def _header(self) -> dict[str, Any]:
-        names = ("gap", "exact", "r_max", "margin_cap", "solves")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in NUMBERS}
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle. Beside first, then renamed."""
@@ -148,11 +147,10 @@ class LambdaPath:
             InvalidReward: the file holds no path.
         """
         header, arrays = read_archive(path, cls.FORMATS)
-        names = ("gap", "exact", "r_max", "margin_cap", "solves")
-        missing = [name for name in names if name not in header] + [name for name in ARRAYS if name not in arrays]
+        missing = [name for name in NUMBERS if name not in header] + [name for name in ARRAYS if name not in arrays]
         if missing:
             raise InvalidReward(f"{path} has no {missing[0]}: expected a file written by LambdaPath.save.")
-        return cls(**{name: arrays[name] for name in ARRAYS}, **{name: header[name] for name in names})
+        return cls(**{name: arrays[name] for name in ARRAYS}, **{name: header[name] for name in NUMBERS})
 
 
 def lambda_path(

@@ -21,7 +21,7 @@ from irl_gym.comparisons import compare
 from irl_gym.dual_bound import DualBound
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import SolverFailed, SolverTimeout
-from irl_gym.learners.linear_program import picking
+from irl_gym.learners.programs import picking
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.warm_lp import Vertex, WarmLP

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from irl_gym._typing import Sparse
 from irl_gym.ambiguity.extremes import Polytope, extremes
 from irl_gym.ambiguity.feasible import Posed
-from irl_gym.learners.linear_program import picking
+from irl_gym.learners.programs import picking
 from irl_gym.warm_lp import WarmLP
 
 Found = tuple[np.ndarray, np.ndarray, int]

@@ -26,8 +26,7 @@ from irl_gym.ambiguity.widths import served_states
 from irl_gym.checks import checked_number
 from irl_gym.errors import DegenerateExpert, InvalidParameter
 from irl_gym.learners.finite import FiniteLP
-from irl_gym.learners.linear_program import picking
-from irl_gym.learners.programs import JUST_BELOW, RewardOn
+from irl_gym.learners.programs import JUST_BELOW, RewardOn, picking
 from irl_gym.mdp import TabularMDP
 from irl_gym.warm_lp import Vertex
 

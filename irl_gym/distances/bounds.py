@@ -20,8 +20,8 @@ from irl_gym.distances.exact import EPIC
 from irl_gym.distances.payments import payments
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import InvalidMDP
-from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import checked_mdp, policy_value
+from irl_gym.mdp import TabularMDP, checked_mdp
+from irl_gym.metrics import policy_value
 
 FORGOTTEN = 1e-9
 """Time steps that are discounted by more than this are not looked at."""

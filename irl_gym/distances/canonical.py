@@ -117,7 +117,7 @@ class ModelDraws:
 
 @dataclass(frozen=True, eq=False)
 class ValueAdjustedLevelling:
-    """STARC's VAL (Skalse et al. 2024, proposition 2).
+    """STARC's VAL (Skalse et al. 2024, section 3).
 
         C(R)(s, a, s') = E_{S'}[R(s, a, S') + gamma V(S')] - V(s)
     with S' from P(. | s, a) and V the value of a policy under R: the policy's advantage, which is the same for every s'.
@@ -138,7 +138,7 @@ class ValueAdjustedLevelling:
 
 @dataclass(frozen=True)
 class MinimalNorm:
-    """STARC's minimal canonicalisation for the L2 norm (Skalse et al. 2024, section 3.1): the smallest equivalent reward.
+    """STARC's minimal canonicalisation for the L2 norm (Skalse et al. 2024, section 3): the smallest equivalent reward.
 
         C(R) = R + gamma Phi(s') - Phi(s), Phi = argmin of the mean square over pairs (s, a), s' from P(. | s, a)
     after R was replaced by its mean over s' where it is levelled. An orthogonal projection, so it needs no policy.

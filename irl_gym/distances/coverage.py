@@ -14,8 +14,7 @@ import numpy as np
 from irl_gym._typing import Indices, Numbers
 from irl_gym.checks import float_array
 from irl_gym.errors import InvalidParameter, UndefinedDistance
-from irl_gym.mdp import TabularMDP, entry_rows
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, checked_mdp, entry_rows
 
 SUM_TOLERANCE = 1e-8
 

@@ -138,7 +138,7 @@ class DARD(Correlation):
 
 @dataclass(frozen=True, eq=False)
 class STARC(RewardDistance):
-    """A Standardised Reward Comparison (Skalse et al. 2024, definition 2): m(s(R_1), s(R_2)) / 2 with s(R) = C(R) / n(C(R)).
+    """A Standardised Reward Comparison (Skalse et al. 2024, section 3): m(s(R_1), s(R_2)) / 2 with s(R) = C(R) / n(C(R)).
 
     Norms are means over the coverage distribution, so they do not grow with the table; a reward that all policies earn alike
     has s(R) = 0. The half makes opposite rewards 1 apart, as they are with EPIC; the paper leaves it out.

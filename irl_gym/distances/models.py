@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, checked_rng
 from irl_gym.distances.transitions import Transitions
 from irl_gym.errors import InvalidParameter, UndefinedDistance
-from irl_gym.intervals import checked_rng
-from irl_gym.mdp import TabularMDP, TransitionTable
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, TransitionTable, checked_mdp
 from irl_gym.sampling import Successors
 
 Model = Callable[[Any, np.ndarray, np.random.Generator], tuple[Any, np.ndarray]]

@@ -14,8 +14,7 @@ import numpy as np
 from irl_gym._typing import Matrix, Vector
 from irl_gym.checks import float_array
 from irl_gym.errors import InvalidReward
-from irl_gym.mdp import TabularMDP, entry_rows
-from irl_gym.metrics import checked_mdp
+from irl_gym.mdp import TabularMDP, checked_mdp, entry_rows
 from irl_gym.rewards import TabularReward
 
 

@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, checked_rng
 from irl_gym.distances.comparing import ROUNDING
 from irl_gym.distances.jackknife import Distance, jackknife, replicated_distance
 from irl_gym.distances.models import Model, stepped
 from irl_gym.distances.sampled import BLOCKS, RewardCall, checked_sample, paid
 from irl_gym.distances.transitions import Transitions
 from irl_gym.errors import InvalidParameter
-from irl_gym.intervals import checked_rng
 from irl_gym.mdp import check_discount
 
 ROWS = 20_000

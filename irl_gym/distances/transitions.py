@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, checked_rng
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDistance
 from irl_gym.features import batch_size, by_part, take
-from irl_gym.intervals import checked_rng
 from irl_gym.mdp import check_discount
 
 OPTIONAL = ("terminated", "groups", "terminal")

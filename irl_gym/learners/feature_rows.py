@@ -20,7 +20,7 @@ from irl_gym.features import FeatureMap, over_rows
 from irl_gym.generative import GenerativeModel
 from irl_gym.learners.weights import Rows
 from irl_gym.mdp import TabularMDP
-from irl_gym.policies import Policy
+from irl_gym.policies import Policy, policy_array
 
 BLOCK = 1 << 24
 """Numbers of V_i held at a time: 128 MB, and as much again for phi."""
@@ -44,7 +44,7 @@ class FeatureRows:
 
 def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
     """An expert with random actions where nothing is known of it, and (S,) where something is."""
-    array = np.asarray(expert)
+    array = policy_array(expert)
     if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
         return expert, np.ones(n_states, dtype=bool)
     unknown = np.asarray(np.isnan(array).all(axis=1))

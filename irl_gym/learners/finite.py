@@ -31,13 +31,13 @@ import numpy as np
 from irl_gym.certificate import Certificate, certify, least_per_state, row_margins
 from irl_gym.checks import checked_number, float_array
 from irl_gym.comparisons import Comparisons, compare
-from irl_gym.errors import DegenerateExpert, InvalidMDP, InvalidParameter, SolverFailed, SolverInfeasible
+from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
 from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.partial import PartialTask
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved, Solving
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import SolverName, Status, check_solving
 
@@ -105,8 +105,7 @@ class FiniteLP:
             DegenerateExpert: (4) leaves no reward with a positive margin anywhere.
             SolverTimeout, SolverFailed: no answer.
         """
-        if not isinstance(mdp, TabularMDP):
-            raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
+        checked_mdp(mdp)
         known_expert, known = completed(expert, mdp.n_states)
         acting = mdp.reachable & ~mdp.terminal
         visits = _checked_visits(visits, known & acting)

@@ -46,9 +46,3 @@ class LinearProgram:
         reduced = self.cost - self.A.T @ y
         low, high = np.maximum(self.lower, -self.box), np.minimum(self.upper, self.box)
         return float(self.b @ y + np.maximum(reduced * low, reduced * high).sum()) + self.constant
-
-
-def picking(columns: np.ndarray, width: int) -> sp.csr_array:
-    """The (n, width) matrix that picks `columns`."""
-    n = columns.size
-    return sp.csr_array((np.ones(n), columns, np.arange(n + 1)), shape=(n, width))

@@ -80,8 +80,8 @@ class Program:
             here_R = sp.csr_array(unit * mdp.mixing(comparisons.distribution))
             self.constraints += [sp.csr_array(unit * closing) @ V == here_R @ self.R]  # (5) on steps
             stacked = comparisons.states * mdp.n_actions + comparisons.actions
-            here = _selection(comparisons.states, mdp.n_states)
-            pair = _selection(stacked, mdp.n_states * mdp.n_actions)
+            here = picking(comparisons.states, mdp.n_states)
+            pair = picking(stacked, mdp.n_states * mdp.n_actions)
             self.margins = sp.csr_array(here - mdp.gamma * mdp.P[stacked]) @ V - pair @ self.R
             ended = np.repeat(mdp.terminal, mdp.n_actions)
             if ended.any():
@@ -106,7 +106,7 @@ class Program:
         """Optimise subject to (4), with `margin` (m,) below the margins of the rows that count."""
         vector = margin if isinstance(margin, cp.Expression) else cp.Constant(np.full(self.n_margins, margin))
         groups = [
-            (self.counted, _selection(self._position, self.n_margins) @ vector),
+            (self.counted, picking(self._position, self.n_margins) @ vector),
             (~self.counted & ~self.equal, None),
         ]
         rows: list[tuple[np.ndarray, Any]] = []
@@ -126,7 +126,7 @@ class Program:
         return Solved(np.asarray(self.R.value).reshape(self.shape), y, answer)
 
 
-def _selection(columns: np.ndarray, width: int) -> sp.csr_array:
+def picking(columns: np.ndarray, width: int) -> sp.csr_array:
     """The (n, width) matrix that picks `columns`."""
     n = columns.size
     return sp.csr_array((np.ones(n), columns, np.arange(n + 1)), shape=(n, width))

@@ -28,8 +28,8 @@ import scipy.sparse as sp
 
 from irl_gym._typing import StateMask, Vector
 from irl_gym.comparisons import Comparisons
-from irl_gym.learners.linear_program import LinearProgram, picking
-from irl_gym.learners.programs import RewardOn, Solving
+from irl_gym.learners.linear_program import LinearProgram
+from irl_gym.learners.programs import RewardOn, Solving, picking
 from irl_gym.mdp import TabularMDP
 from irl_gym.solvers import Answer
 

@@ -1,6 +1,7 @@
 """What the discount, and a world without an end, make of a reward."""
 
 import numpy as np
+import pytest
 from models import ring
 from patients import corridor, finding, judged, names, right
 
@@ -21,6 +22,12 @@ def test_a_gamma_so_small_that_margins_vanish_is_told_with_a_larger_one():
     mdp = corridor(12, 0.1)
     said = finding("small-gamma", judged(mdp, right(mdp), GOAL), mdp, right(mdp))
     assert set(said.states.tolist()) >= {0, 1, 2, 3} and 10 not in said.states and "at 0.5" in said.mend
+
+
+@pytest.mark.parametrize("length, told", [(14, False), (15, True)])
+def test_a_few_margins_that_vanish_are_no_finding(length, told):
+    mdp = corridor(length, 0.3)  # margins vanish in 1 of 13 states, or in 2 of 14: from a tenth on it is told
+    assert ("small-gamma" in names(judged(mdp, right(mdp), np.eye(length)[-1]), mdp, right(mdp))) == told
 
 
 def test_the_larger_gamma_mends_margins_that_vanish():

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from models import ring
 
+from irl_gym.distances import epic
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.random_rewards import random_mdp
 
@@ -24,8 +26,14 @@ def test_regret_and_bounds_are_0_for_a_scaled_reward():
 
 
 def test_K_is_1_over_the_coverage_of_a_certain_transition():
-    from models import ring
-
     mdp = ring([[1, 1], [0, 0]])
     found = epic_bound(mdp, np.array([0.0, 1.0]), np.arange(8.0).reshape(2, 2, 2) ** 2)
     assert found.K == pytest.approx(4.0)  # each of 2 states half of the time: 0.5 / (1 / 8)
+
+
+def test_the_bound_is_that_of_the_theorem():
+    mdp = random_mdp(np.random.default_rng(2), 5, 2, 0.8)
+    R, other = np.random.default_rng(3).normal(size=(2, 5, 2, 5))
+    found = epic_bound(mdp, R, other)
+    assert found.distance == pytest.approx(epic(mdp, R, other, coverage=np.full(R.shape, 1 / R.size)))
+    assert found.bound == pytest.approx(16 * found.K * np.sqrt((R**2).mean()) * found.distance / (1 - 0.8))

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from irl_gym.learners.linear_program import LinearProgram, picking
-from irl_gym.learners.programs import Solving
+from irl_gym.learners.linear_program import LinearProgram
+from irl_gym.learners.programs import Solving, picking
 
 
 def drawn(seed, n=4, m=6):

@@ -35,7 +35,10 @@ def checked_number(
         InvalidInput: of the class given.
     """
     kind = numbers.Integral if whole else numbers.Real
-    number = float(value) if isinstance(value, kind) and not isinstance(value, bool) else np.nan
+    try:
+        number = float(value) if isinstance(value, kind) and not isinstance(value, bool) else np.nan
+    except OverflowError:  # a whole number beyond floats
+        number = np.inf
     fine = np.isfinite(number) and (above is None or number > above) and (least is None or number >= least)
     if not (fine and (below is None or number < below)):
         raise error(f"{name} is {value!r}: expected {expected}.")

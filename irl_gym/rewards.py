@@ -7,6 +7,7 @@ greedy for both, and a terminal goal is paid exactly once. A reward on steps (S,
 
 import json
 import os
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -23,7 +24,8 @@ from irl_gym.mdp import TransitionTable
 
 FORMAT = "irl_gym.TabularReward/1"
 UNREADABLE = (
-    ValueError, KeyError, EOFError, TypeError, NotImplementedError, OSError, AttributeError, zipfile.BadZipFile, zlib.error,
+    ValueError, KeyError, EOFError, TypeError, RuntimeError, OSError, AttributeError, struct.error, zipfile.BadZipFile,
+    zlib.error,
 )  # fmt: skip
 """What `np.load` and json raise of a file that is damaged, or is something else."""
 

@@ -156,3 +156,8 @@ def test_names_differ_when_anything_else_does(other):
 def test_names_differ_when_the_learner_does():
     names = {lake(learner=one).name for one in (FeatureLP(OneHot(16)), TrajectoryLP(OneHot(16)), FiniteLP())}
     assert len(names) == 3
+
+
+def test_a_number_beyond_floats_is_refused_in_words():
+    with pytest.raises(InvalidParameter, match=r"^episodes is 10{400}: expected"):
+        Experiment("FrozenLake-v1", 0.9, episodes=10**400)

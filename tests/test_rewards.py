@@ -1,3 +1,4 @@
+import contextlib
 import json
 import pickle
 
@@ -188,3 +189,13 @@ def test_as_reward_makes_a_table_of_an_array_and_leaves_one_as_it_is():
 def test_a_reward_that_is_no_array_of_real_numbers_is_refused(given, told):
     with pytest.raises(InvalidReward, match=told):
         as_reward(given)
+
+
+def test_a_flipped_bit_is_named_not_raised_as_it_is(tmp_path):
+    path = tmp_path / "reward.npz"
+    TabularReward(np.arange(6.0)).save(path)
+    whole = path.read_bytes()
+    for place in range(0, len(whole), 3):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
+        with contextlib.suppress(InvalidReward):  # a byte that nobody reads does no harm
+            TabularReward.load(path)

@@ -39,6 +39,7 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     nothing.constant_reward,
     sampled.inexpressible,
     truth.poor_expert,
+    truth.few_episodes,
     ties.violated,
     truth.lossy_ties,
     ties.same_successors,
@@ -151,7 +152,8 @@ def diagnose_run(run: "Run") -> Diagnosis:
     reward: Mapping[str, Any] = run.stages.get("reward", {})
     table, claims = run.table, run.certificate
     if table is None:
-        return diagnose(Case(claims=claims, status=reward.get("status", ""), stats=reward.get("stats", {})))
+        stats = reward.get("stats", {})
+        return diagnose(Case(claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics))
     case = Case(
         table.mdp,
         seen_with_noise(run.path, table) if run.config.get("epsilon") else run.expert,
@@ -161,6 +163,7 @@ def diagnose_run(run: "Run") -> Diagnosis:
         reward.get("stats", {}),
         table.reward,
         bool(run.config.get("shaping")),
+        run.metrics,
     )
     return diagnose(case)
 

@@ -8,53 +8,94 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from irl_gym import metrics
-from irl_gym._typing import ActionSets
+from irl_gym._typing import ActionSets, Matrix
 from irl_gym.curves import Curve, read_curve
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular
 from irl_gym.intervals import mean_interval
+from irl_gym.mdp import TabularMDP
 from irl_gym.policies import support
+from irl_gym.rewards import TabularReward
+from irl_gym.scores import Scale, half_width
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
     from irl_gym.loop import Loop
 
-GOOD = 0.9
-"""Score that the learning curve is reported to reach for good."""
+JUDGING = 1_000_003
+"""Added to the seed of the episodes that judge, the same for all: policies that do the same then earn the same."""
+GOOD, NEARLY_ALL = 0.9, 0.99
+"""Scores that the learning curve is reported to reach for good."""
 
 
 def evaluate(loop: "Loop") -> dict[str, Any]:
     """Judge the expert, a random policy, the retrained agent and the recovered reward."""
     experiment, world = loop.experiment, loop.world
-    random = world.value(world.random)
     earned = _earned(loop) if from_data(loop) else np.zeros((0, 2))
-    expert = float(earned[:, 0].mean()) if from_data(loop) else world.value(loop.expert)
+    scale = _scale(loop, earned[:, 0])
+    agreed = optimal_set(loop) if isinstance(world, TableWorld) else None
     rows = {}
-    for number, (name, policy) in enumerate({"expert": loop.expert, "random": world.random, "retrained": loop.agent}.items()):
+    for name, policy in {"expert": loop.expert, "random": world.random, "retrained": loop.agent}.items():
         told = name == "expert" and from_data(loop)
-        seed = experiment.seed + 1_000_003 * (number + 1)
-        episodes = [] if told else world.episodes(policy, experiment.eval_episodes, seed)
+        episodes = [] if told else world.episodes(policy, experiment.eval_episodes, experiment.seed + JUDGING)
         returns = earned[:, 1] if told else np.array([episode.total_reward for episode in episodes])
         mean, low, high = mean_interval(returns, rng=np.random.default_rng(experiment.seed))
-        value = {"expert": expert, "random": random}.get(name)
+        value = {"expert": scale.expert, "random": scale.random}.get(name)
         value = world.value(policy) if value is None else value
         rows[name] = {
             "value": value,
-            "score": _score(value, random, expert),
+            "score": scale.score(value),
             "mean_return": mean,
             "return_low": low,
             "return_high": high,
-            "agreement": metrics.agreement(world.table.mdp, policy, optimal_set(loop))
-            if isinstance(world, TableWorld) and not told
+            "agreement": metrics.agreement(world.table.mdp, policy, agreed)
+            if isinstance(world, TableWorld) and agreed is not None and not told
             else None,
         }
     curve = learning_curve(loop)
-    training = {
-        "environment_steps": loop.stage("agent")["environment_steps"],
-        "steps_to_0.9": settled_at(np.column_stack([curve.steps, curve.value]), random, expert),
+    points = np.column_stack([curve.steps, curve.value])
+    training: dict[str, Any] = {"environment_steps": loop.stage("agent")["environment_steps"]}
+    for good in (GOOD, NEARLY_ALL):
+        settled = None if scale.reason is not None else settled_at(points, scale.random, scale.expert, good)
+        training[f"steps_to_{good:g}"] = settled
+    low, high = scale.interval
+    return {
+        "policies": rows,
+        "score_reason": scale.reason,
+        "expert_value": {"episodes": scale.episodes, "low": low, "high": high},
+        "reward": _reward(loop, scale),
+        "training": training,
+        "table": _table(world) if isinstance(world, TableWorld) else None,
+        "demonstrations": _recorded(loop),
     }
-    shown = {"policies": rows, "reward": _reward(loop, random, expert), "training": training}
-    return {**shown, "table": _table(world) if isinstance(world, TableWorld) else None, "demonstrations": _recorded(loop)}
+
+
+def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
+    """What a score is measured by; earned are the discounted returns (N,) of episodes that were given."""
+    world, rounding = loop.world, 0.0
+    if isinstance(world, TableWorld):
+        rounding = metrics.TIE_TOLERANCE * float(np.abs(world.table.reward.values).max())
+    random = world.value(world.random)
+    if not from_data(loop):
+        return Scale(random, world.value(loop.expert), rounding, gamma=world.gamma)
+    half = half_width(earned, _without_chance(loop))
+    return Scale(random, float(earned.mean()), rounding, half, earned.size, world.gamma)
+
+
+def _without_chance(loop: "Loop") -> bool:
+    """Are all episodes given the same, in a table in which start and steps could not have gone otherwise?"""
+    world = loop.world
+    if not isinstance(world, TableWorld) or not world.table.evidence.exact:
+        return False
+    mdp, first = world.table.mdp, loop.demonstrations[0]
+    rows = first.rows(world.table.states)
+    if any(
+        not (np.array_equal(one.rows(world.table.states), rows) and np.array_equal(one.actions, first.actions))
+        for one in loop.demonstrations
+    ):
+        return False
+    taken = mdp.P[rows[:-1] * mdp.n_actions + first.actions]
+    return np.count_nonzero(mdp.d0) == 1 and int((taken > 0).sum(axis=1).max(initial=0)) <= 1
 
 
 def _earned(loop: "Loop") -> np.ndarray:
@@ -70,11 +111,6 @@ def _earned(loop: "Loop") -> np.ndarray:
         for episode in loop.demonstrations
     ]
     return np.array([[world.gamma ** np.arange(len(one)) @ one, one.sum()] for one in paid])
-
-
-def _score(value: float, random: float, expert: float) -> float | None:
-    """Random = 0, expert = 1; None where the expert earns no more than random actions, and there is no such scale."""
-    return _plain(metrics.normalised_score(value, random, expert)) if expert > random else None
 
 
 def from_data(loop: "Loop") -> bool:
@@ -97,15 +133,26 @@ def optimal_set(loop: "Loop") -> ActionSets:
     world = loop.world
     if not isinstance(world, TableWorld):
         raise NotTabular("the environment is only stepped: expected a table. Which actions are optimal is not known.")
-    mdp, reward = world.table.mdp, world.table.reward
-    best = policy_iteration(mdp, reward)
-    tolerance = metrics.TIE_TOLERANCE * float(np.abs(reward.values).max())
-    if loop.experiment.from_episodes or world.value(loop.expert) >= float(mdp.d0 @ best.V) - tolerance:
-        return tied(best.Q, tolerance)
-    return support(loop.expert, mdp.n_states, mdp.n_actions)
+    mdp, true = world.table.mdp, world.table.reward
+    return good_actions(mdp, true, None if loop.experiment.from_episodes else loop.expert, policy_iteration(mdp, true).Q)
 
 
-def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
+def good_actions(mdp: TabularMDP, true: TabularReward, expert: np.ndarray | None, Q: Matrix) -> ActionSets:
+    """(S, A) the actions that agree with an expert: every optimal one if it is optimal, else those it takes.
+
+    Args:
+        mdp: P, gamma and d0.
+        true: the reward that judges.
+        expert: (S,) actions or (S, A) probabilities; None where it errs or is known by data, and optimal actions count.
+        Q: (S, A) optimal values under the true reward.
+    """
+    tolerance = metrics.TIE_TOLERANCE * float(np.abs(true.values).max())
+    if expert is None or metrics.policy_value(mdp, true, expert) >= float(mdp.d0 @ Q.max(axis=1)) - tolerance:
+        return tied(Q, tolerance)
+    return support(expert, mdp.n_states, mdp.n_actions)
+
+
+def _reward(loop: "Loop", scale: Scale) -> dict[str, Any]:
     """The certificate's numbers, the sizes of its lists of states, and on tables what the worst tie loses."""
     told: dict[str, Any] = {"learner": loop.stage("reward")["learner"], "status": loop.stage("reward")["status"]}
     for key, value in loop.certificate.items():
@@ -118,11 +165,10 @@ def _reward(loop: "Loop", random: float, expert: float) -> dict[str, Any]:
         told["reward_on"] = "state" if world.tabular(loop.learned).on_states else "state-action"
         worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
         value = worst.value if world.horizon is None else world.value(worst.policy)
-        share = (expert - value) / (expert - random) if expert > random else float("nan")
         told |= {
             "worst_tie_value": value,
-            "worst_tie_regret": expert - value,
-            "worst_tie_regret_share": _plain(share),
+            "worst_tie_regret": scale.expert - value,
+            "worst_tie_regret_share": scale.share(scale.expert - value),
         }
     stats = loop.stage("reward")["stats"]
     rounds = {"rounds": len(stats["rounds"])} if "rounds" in stats else {}
@@ -149,15 +195,10 @@ def learning_curve(loop: "Loop") -> Curve:
     return loop.folder.load("learning_curve.csv", read_curve)
 
 
-def settled_at(curve: np.ndarray, random: float, expert: float) -> int | None:
-    """Environment steps after which the score on a learning curve (n, 2) stays at GOOD or above; None if it does not."""
+def settled_at(curve: np.ndarray, random: float, expert: float, good: float = GOOD) -> int | None:
+    """Environment steps after which the score on a learning curve (n, 2) stays at `good` or above; None if it does not."""
     if not expert > random or not len(curve):
         return None
-    bad = np.flatnonzero((curve[:, 1] - random) / (expert - random) < GOOD)
+    bad = np.flatnonzero((curve[:, 1] - random) / (expert - random) < good)
     first = bad[-1] + 1 if bad.size else 0
     return int(curve[first, 0]) if first < len(curve) else None
-
-
-def _plain(value: float) -> float | None:
-    """A float as json holds it: NaN becomes None."""
-    return None if np.isnan(value) else value

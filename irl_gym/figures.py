@@ -10,7 +10,7 @@ from irl_gym import plotting
 from irl_gym.cell_maps import draw_actions, draw_planes
 from irl_gym.cells import Cells
 from irl_gym.dynamic_programming import evaluate_policy
-from irl_gym.evaluation import from_data, learning_curve, optimal_set
+from irl_gym.evaluation import learning_curve
 from irl_gym.layouts import GridLayout, grid_layout
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
@@ -65,7 +65,7 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
         told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)
         return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})
     agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
-    optimal = optimal_actions(mdp, true) if not from_data(loop) else optimal_set(loop)
+    optimal = optimal_actions(mdp, true)
     names = Names(action_names(loop.env), lambda row: state_name(loop.env_id, table.states.decode(row), None))
     return {
         "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp, names),

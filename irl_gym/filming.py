@@ -95,20 +95,20 @@ def _stage(env: gym.Env) -> tuple[gym.Env, str | None]:
 
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
-    """Environments draw with pygame, which greets on standard output and complains where there is no screen or no sound."""
+    """Environments draw with pygame, which greets on standard output and complains where there is no screen or no sound.
+
+    What the user has set stays as it is.
+    """
     quiet = {"PYGAME_HIDE_SUPPORT_PROMPT": "1", "SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
-    before = {name: os.environ.get(name) for name in quiet}
-    os.environ.update(quiet)
+    unset = [name for name in quiet if name not in os.environ]
+    os.environ.update({name: quiet[name] for name in unset})
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in unset:
+            os.environ.pop(name, None)
 
 
 def _told(error: Exception) -> str:

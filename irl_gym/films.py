@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = "irl_gym.Film/1"
+KINDS = ("webp", "png")
+"""Formats of pictures."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def load_film(path: Path) -> Film:
     told: Any = json.loads(path.read_text())
     if told["format"] != FORMAT:
         raise ValueError(f"its format is {told['format']!r}: expected {FORMAT!r}")
+    if told["kind"] not in KINDS:  # it is part of a file's name: else a stranger's run could name any file
+        raise ValueError(f"its pictures are of the kind {told['kind']!r:.40}: expected one of {', '.join(KINDS)}")
     pictures = (path.with_suffix("") / f"{number:03d}.{told['kind']}" for number in range(told["frames"]))
     return Film(
         told["name"], told["seed"], tuple(Moment(**one) for one in told["steps"]), told["ends"],

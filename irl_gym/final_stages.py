@@ -50,7 +50,8 @@ def record(loop: "Loop", folder: Path) -> dict[str, Any]:
     layout = layout_of(loop.env, loop.world) if isinstance(loop.world, TableWorld) else None
     if layout is not None:
         write_json(folder / "grid.json", layout.to_json())
-    write_metrics_csv(loop.folder_metrics, folder / "metrics.csv")
+    asked, kept = loop.experiment, folder / "metrics.csv"
+    write_metrics_csv(loop.folder_metrics, kept, env=loop.env_id, gamma=asked.gamma, seed=asked.seed)
     return {"without_frames": without}
 
 
@@ -81,7 +82,7 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
 def _case(loop: "Loop") -> Case:
     """The evidence that the doctor works on, of a table or, without one, of the certificate alone."""
     made = loop.stage("reward")
-    without = Case(claims=loop.certificate, status=made["status"], stats=made["stats"])
+    without = Case(claims=loop.certificate, status=made["status"], stats=made["stats"], judged=loop.folder_metrics)
     if not isinstance(loop.world, TableWorld):
         return without
     table = loop.world.table
@@ -105,10 +106,8 @@ def _too_much(loop: "Loop") -> str | None:
 
 
 def _widths(loop: "Loop") -> dict[str, np.ndarray]:
-    """How far apart the rewards of one state can be; nothing for a reward of steps, which has no map."""
+    """How far apart the rewards of one state can be, or of one step."""
     learner: Any = loop.experiment.learner
-    if learner.reward_on != "state":
-        return {}
     mdp = loop.world.table.mdp  # type: ignore[union-attr]
     found = feasible_widths(mdp, loop.known_expert, r_max=learner.r_max, reward_on=learner.reward_on)
     return {"low": found.low, "high": found.high, "width": found.width}

@@ -1,6 +1,8 @@
-"""The figures of a run's policies in long form, for other people's tools: policy, metric, value.
+"""The figures of a run in long form, for other people's tools: env, gamma, seed, policy, metric, value.
 
 pandas.read_csv("metrics.csv").pivot(index="policy", columns="metric", values="value")
+
+The first three columns tell runs apart when several are stacked. The reward has rows of its own, as the policy "reward".
 """
 
 import csv
@@ -8,17 +10,23 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-COLUMNS = ("policy", "metric", "value")
+COLUMNS = ("env", "gamma", "seed", "policy", "metric", "value")
+REWARD = "reward"
+"""Stands for a policy's name in the rows of the reward's numbers."""
 
 
-def write_metrics_csv(metrics: Mapping[str, Any], path: Path) -> None:
-    """Write the numbers of metrics.json's policies; what is not known is left empty.
+def write_metrics_csv(metrics: Mapping[str, Any], path: Path, *, env: str | None, gamma: float, seed: int) -> None:
+    """Write the numbers of metrics.json's policies and reward; what is not known is left empty.
 
     Args:
         metrics: the content of metrics.json.
         path: the csv.
+        env: the environment's id; empty where it has none.
+        gamma: discount.
+        seed: the run's.
     """
-    rows = [(policy, name, value) for policy, told in metrics["policies"].items() for name, value in _numbers(told)]
+    parts = {**metrics["policies"], REWARD: metrics["reward"]}
+    rows = [(env, gamma, seed, part, name, value) for part, told in parts.items() for name, value in _numbers(told)]
     with path.open("w", newline="") as file:
         csv.writer(file).writerows([COLUMNS, *rows])
 
@@ -29,4 +37,4 @@ def _numbers(told: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, f
         if isinstance(value, Mapping):
             yield from _numbers(value, f"{prefix}{name}.")
         elif value is None or isinstance(value, int | float):
-            yield f"{prefix}{name}", value
+            yield f"{prefix}{name}", int(value) if isinstance(value, bool) else value

@@ -21,7 +21,8 @@ class Report:
     out: Path
     """The folder."""
     metrics: Mapping[str, Any]
-    """The content of metrics.json: policies, reward, training, demonstrations, and table, None where there is none."""
+    """The content of metrics.json: policies, score_reason (None where there is a score), expert_value (its 95 % interval),
+    reward, training, demonstrations, and table, None where there is none."""
     certificate: Mapping[str, Any]
     """The content of certificate.json."""
     stages: Mapping[str, Mapping[str, Any]]
@@ -55,8 +56,8 @@ def recover_and_retrain(
         films/, grid.json                             episodes to watch; the map of a grid
         diagnosis.json, ambiguity.npz                 what the doctor says; for small tables, how far the reward is left open
         report.html                                   all of it, on a page
-    The same seed leaves the same bytes, but for agent.zip and tensorboard/, which hold the time. A run that was killed goes on
-    after its last stage.
+    The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
+    that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage.
 
     Args:
         experiment: what to do.

@@ -18,15 +18,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import CenteredNorm, Normalize
 from matplotlib.figure import Figure
-from scipy.sparse.linalg import lsmr
 
 from irl_gym import drawing
 from irl_gym._typing import ActionSets, Matrix, Vector
+from irl_gym.arrivals import paid_on_arrival
 from irl_gym.errors import InvalidParameter
 from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TransitionTable
 from irl_gym.names import Names
-from irl_gym.rewards import TabularReward
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ def draw_rewards(
         return figure
     figure, axes = drawing.panels(layout)
     for axis, name, R in ((axes[0], "True reward", true), (axes[1], "Learned reward", learned)):
-        on_states = R if R.ndim == 1 else arrival_reward(R, table)
+        on_states = R if R.ndim == 1 else paid_on_arrival(R, table)
         if on_states is None:
             told = drawing.triangles(axis, layout, R)
         else:
@@ -253,20 +252,6 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
     with matplotlib.rc_context({"svg.hashsalt": "irl_gym"}):
         figure.savefig(beside, format=kind, dpi=130, metadata=blank[kind])
     beside.replace(path)
-
-
-def arrival_reward(R: Matrix, table: TransitionTable) -> Vector | None:
-    """The reward on states that pays R in expectation in every step an episode can take, or None if there is none.
-
-    Args:
-        R: (S, A) reward of steps.
-        table: S states, A actions.
-    """
-    rows = np.repeat(table.reachable & ~table.terminal, table.n_actions)
-    wanted = R.ravel()[rows]
-    found = lsmr(table.P[rows], wanted, atol=1e-12, btol=1e-12, maxiter=20_000)[0]
-    explained = TabularReward(found).expected(table).ravel()[rows]
-    return found if np.abs(explained - wanted).max(initial=0) <= 1e-6 * np.abs(wanted).max(initial=0) else None
 
 
 def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, table: TransitionTable, names: Names) -> None:

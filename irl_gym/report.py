@@ -1,12 +1,16 @@
 """A run in a few tables a person reads, for the terminal."""
 
+import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.table import Table
+from rich.text import Text
 
+from irl_gym.claims import ENVIRONMENT
 from irl_gym.pipeline import Report
+from irl_gym.run_folder import read_json
 
 MUCH = 0.05
 """Share of the expert's advantage over random; a worst tie that loses more is worth a warning."""
@@ -14,6 +18,12 @@ MUCH = 0.05
 
 ENOUGH = 0.9
 """Score of an agent that has learned what the reward asks for."""
+
+ROUNDING = 1e-12
+"""A distance from the best possible up to this is none."""
+
+HARM = 1e-6
+"""Share of the expert's advantage over random below which a tie costs nothing but rounding."""
 
 
 def print_report(report: Report, console: Console) -> None:
@@ -29,14 +39,24 @@ def render(report: Report) -> Iterator[RenderableType]:
     yield _reward(report)
     yield _stages(report)
     yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics, figures and films."
+    yield from _doctor(report)
     yield f"Open {report.page} in a browser."
+
+
+def _doctor(report: Report) -> Iterator[RenderableType]:
+    """How much the doctor found; nothing for a healthy run."""
+    diagnosis = report.out / "diagnosis.json"
+    count = len(read_json(diagnosis)["findings"]) if diagnosis.exists() else 0
+    if count:
+        things = "1 thing" if count == 1 else f"{count} things"
+        yield Text(f"The doctor found {things}: python scripts/doctor.py --run {shlex.quote(str(report.out))}")
 
 
 def _asked(report: Report) -> str:
     """Where and with which discount it was done, and what the environment was made to do."""
     config = report.config
     made = ", ".join(f"{name}={value}" for name, value in config["env_kwargs"].items())
-    where = config["env_id"] or f"the environment of {config['dataset']}"
+    where = config["env_id"] or f"{_recorded_in(report)}the environment of {config['dataset']}"
     told = [f"{where} ({made})" if made else where, f"gamma {config['gamma']:g}", f"seed {config['seed']}"]
     if config["start_seeds"]:
         told.append(f"layouts from the seeds {', '.join(map(str, config['start_seeds']))}")
@@ -44,6 +64,13 @@ def _asked(report: Report) -> str:
         hidden = ", ".join(f"{name} ({n} values)" for name, n in report.shown.items())
         told.append(f"shown beside the observation, since the environment hides it: {hidden}")
     return "; ".join(told) + "."
+
+
+def _recorded_in(report: Report) -> str:
+    """The id of the environment that a dataset brought with it, where it has one."""
+    kept = report.out / ENVIRONMENT
+    found = read_json(kept).get("id") if kept.exists() else None
+    return f"{found}, " if found else ""
 
 
 def _policies(report: Report) -> Table:
@@ -57,12 +84,14 @@ def _policies(report: Report) -> Table:
         score = "-" if row["score"] is None else f"{row['score']:.3f}"
         interval = "{:.3f} ({:.3f} to {:.3f})".format(*(row[key] for key in ("mean_return", "return_low", "return_high")))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
-        table.add_row(name, f"{row['value']:.4f}", score, interval, *agreement)
+        whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
+        table.add_row(whose, f"{row['value']:.4f}", score, interval, *agreement)
     given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
     errs = " with its errors" if only and not given else ""
     table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
     if report.metrics["policies"]["expert"]["score"] is None:
-        table.caption += " There is no score: the expert earns no more than random actions."
+        reason = report.metrics.get("score_reason") or "the expert earns no more than random actions"
+        table.caption += f" There is no score: {reason}."
     if known:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if report.metrics["table"] is not None:
@@ -70,6 +99,12 @@ def _policies(report: Report) -> Table:
     table.caption += _of_training(report)
     table.caption_justify = "left"
     return table
+
+
+def _shown(report: Report) -> str:
+    """How many episodes were given."""
+    count = report.metrics["demonstrations"]["episodes"]
+    return "1 episode" if count == 1 else f"{count:,} episodes"
 
 
 def _of_training(report: Report) -> str:
@@ -96,11 +131,9 @@ def _how_valued(report: Report) -> str:
     table = report.metrics["table"]
     if table is None:
         return "discounted, from the start, mean of episodes"
-    given = (
-        f", cut after {table['horizon']} steps, the expert's that of its episodes, paid by the table"
-        if table["horizon"] is not None
-        else ""
-    )
+    cut = f", cut after {table['horizon']} steps" if table["horizon"] is not None else ""
+    from_data = report.metrics["demonstrations"]["given"]
+    given = f"{cut}, the expert's that of its episodes, paid by the table" if from_data else cut
     where = "exact" if table["exact"] else "computed on a table that is an estimate"
     return f"{where}, discounted, from the start{given}"
 
@@ -145,15 +178,20 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
     if reward["degenerate"]:
         yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
     if "worst_tie_regret" in reward:
-        share = reward["worst_tie_regret_share"]
-        of_range = "" if share is None else f", {abs(share):.2%} of what the expert has over random"
-        regret = _zero(reward["worst_tie_regret"])
-        beware = "; how an agent breaks ties decides what it earns" if share is not None and share > MUCH else ""
-        lost = f"{regret:.4g}{of_range}{beware}"
-        yield "worst-tie regret", lost if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
+        yield "worst-tie regret", _worst_tie(reward)
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )
+
+
+def _worst_tie(reward: Mapping[str, Any]) -> str:
+    """What the worst tie loses, where there is a scale to say it on."""
+    share = reward["worst_tie_regret_share"]
+    if share is None:
+        return "not known, as there is no score"
+    regret, of_range = _zero(reward["worst_tie_regret"]), f", {abs(share):.2%} of what the expert has over random"
+    beware = "; how an agent breaks ties decides what it earns" if share > MUCH else ""
+    return f"{regret:.4g}{of_range}{beware}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
 
 
 def _zero(value: float) -> float:
@@ -177,18 +215,23 @@ def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     cap = reward["margin_cap"]
     yield "margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}"
     gap = reward["duality_gap"]
-    yield "margins short of the most by", "unknown" if gap is None else f"at most {max(gap, 0.0):.1e}"
+    yield "margins short of the most by", "unknown" if gap is None else f"at most {gap:.1e}" if gap > ROUNDING else "none"
     if reward["least_l1_norm"] is not None:
         above = max(reward["l1_norm"] - reward["least_l1_norm"], 0.0)
-        yield "||R||_1", f"{reward['l1_norm']:.4g}, at most {above:.1e} above the least with these margins"
+        how = f"at most {above:.1e} above the least" if above > ROUNDING else "the least"
+        yield "||R||_1", f"{reward['l1_norm']:.4g}, {how} with these margins"
+    if reward.get("zero"):  # it ties everything, and the status says why
+        return
     ties = reward["marginless_states"] - reward["violated_states"]
     if ties > 0:
         on_states = reward.get("reward_on") == "state"
         mend = " Try --margin-cap auto." if cap is None else " Try --reward-on state-action." if on_states else ""
         yield "states where it leaves ties", f"{ties}: the expert has no margin there.{mend}"
     if reward["inseparable_states"]:
-        mend = "there an action has the expert's successors. Try --reward-on state-action."
-        yield "states it cannot settle", f"{reward['inseparable_states']}: {mend}"
+        share = reward.get("worst_tie_regret_share")
+        mend = " Try --reward-on state-action." if share is not None and share > HARM else ""
+        mend = " Nothing is lost by it." if share is not None and share <= HARM else mend
+        yield "states it cannot settle", f"{reward['inseparable_states']}: there an action has the expert's successors.{mend}"
 
 
 def _told_feature(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -219,7 +262,8 @@ def _told_trajectory(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _stages(report: Report) -> Table:
-    training = report.metrics["training"]
+    scored = report.metrics["policies"]["expert"]["score"] is not None
+    crossing = report.metrics["training"].get("steps_to_0.99")
     table = Table(title="Stages", title_justify="left", title_style="bold")
     table.add_column("stage")
     table.add_column("seconds", justify="right")
@@ -227,8 +271,7 @@ def _stages(report: Report) -> Table:
     for name, record in report.stages.items():
         taken = record.get("environment_steps", 0)
         steps = f"{taken:,}" if taken else ""
-        if name == "agent" and taken:
-            crossing = training["steps_to_0.9"]
-            steps += " (did not stay at score 0.9)" if crossing is None else f" (score 0.9 or more after {crossing:,})"
+        if name == "agent" and taken and scored:
+            steps += " (did not stay at score 0.99)" if crossing is None else f" (score 0.99 or more after {crossing:,})"
         table.add_row(name, f"{record['seconds']:.1f}{' (kept)' if record.get('kept') else ''}", steps)
     return table

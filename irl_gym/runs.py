@@ -2,10 +2,11 @@
 Axes: S states, A actions, n points of the learning curve, k pieces of the lambda path.
 """
 
+import contextlib
 import json
 import os
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,28 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     )  # fmt: skip
 
 
+@contextlib.contextmanager
+def understood(*paths: str | os.PathLike) -> Iterator[None]:
+    """For what is made of folders that anybody may have written: json that no run leaves is the run's fault, no traceback.
+
+    Args:
+        paths: the folders.
+
+    Raises:
+        RunIncomplete: in place of what the surprise raised, which it names.
+    """
+    try:
+        yield
+    except IrlGymError:
+        raise
+    except (ArithmeticError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        told = ", ".join(map(str, paths))
+        raise RunIncomplete(
+            f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. They were "
+            "changed, or another program wrote them; make the run again."
+        ) from error
+
+
 class _Reader:
     """Reads files of one folder, and says which is wrong."""
 
@@ -173,7 +196,7 @@ class _Reader:
     def record(self, stage: str) -> dict[str, Any] | None:
         """The record of a stage; None where it was not finished."""
         try:
-            return json.loads((self.path / RECORDS / f"{stage}.json").read_text())
+            return read_json(self.path / RECORDS / f"{stage}.json")
         except (OSError, ValueError):
             return None
 

@@ -31,8 +31,8 @@ class Status(enum.Enum):
         "other solver."
     )
     ZERO = (
-        "R = 0 is optimal: the l1 penalty is above lambda_0, where no reward is worth its price. Lower l1 below "
-        'certificate.lambda_0, or use l1="auto".'
+        "R = 0 is optimal: the l1 penalty is above lambda_0, where no reward is worth its price. Lower l1 below lambda_0, or "
+        "make it auto."
     )
     ZERO_WEIGHTS = (
         "R = 0 is optimal, alpha = 0: no reward in the span of the features is worth more. Lower l1, or give features that "

@@ -2,13 +2,14 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from irl_gym.errors import IrlGymError
+from irl_gym.errors import InvalidParameter
 
 
 @contextlib.contextmanager
@@ -29,7 +30,19 @@ def stage_bars(console: Console) -> Iterator[Callable[[str, float], None]]:
         yield show
 
 
-def print_error(error: IrlGymError) -> None:
-    """A mistake of the user's, in one line on standard error: the error's name in red, then what it says."""
+def check_writable(out: Path) -> None:
+    """Check where a file is to go, before anything is worked out.
+
+    Raises:
+        InvalidParameter: the folder does not exist, or there is a folder of the file's own name.
+    """
+    if not out.parent.is_dir():
+        raise InvalidParameter(f"out is {out}, but there is no folder {out.parent}: expected one that exists. Make it first.")
+    if out.is_dir():
+        raise InvalidParameter(f"out is {out}, which is a folder: expected a file's name, such as {out / 'page.html'}.")
+
+
+def print_error(error: Exception) -> None:
+    """A mistake of the user's, or what the system refused, in one line on standard error: the error's name, and its words."""
     text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
     Console(stderr=True, soft_wrap=True).print(text)

@@ -13,8 +13,10 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.errors import InvalidParameter
 from irl_gym.page.comparison import write_comparison
-from irl_gym.runs import read_run
+from irl_gym.runs import read_run, understood
+from irl_gym.terminal import check_writable, print_error
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,13 @@ class Arguments:
 def main(arguments: Arguments) -> int:
     """Read the runs and write the page."""
     try:
-        write_comparison([read_run(one) for one in arguments.runs], arguments.out)
+        if len(arguments.runs) == 1:
+            raise InvalidParameter(f"runs has 1 folder, {arguments.runs[0]}: expected two or more to put side by side.")
+        check_writable(arguments.out)
+        with understood(*arguments.runs):
+            write_comparison([read_run(one) for one in arguments.runs], arguments.out)
     except (IrlGymError, OSError) as error:
-        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
-        Console(stderr=True, soft_wrap=True).print(text)
+        print_error(error)
         return 2
     Console(soft_wrap=True).print(Text(f"Wrote {arguments.out}: {len(arguments.runs)} runs side by side."))
     return 0

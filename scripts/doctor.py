@@ -15,9 +15,11 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.diagnoses.spoken import flags_of, with_names
 from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
 from irl_gym.errors import RunIncomplete
-from irl_gym.runs import read_run
+from irl_gym.runs import Run, read_run, understood
+from irl_gym.terminal import print_error
 
 
 @dataclass(frozen=True)
@@ -28,30 +30,46 @@ class Arguments:
     """The folder of a run: the --out of recover_and_retrain.py."""
 
 
-def show(diagnosis: Diagnosis, console: Console) -> None:
-    """Print a diagnosis."""
+def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
+    """Print a diagnosis: with the names of states where the run is at hand, and mends as Python and as flags."""
     if diagnosis.healthy:
         console.print(Text.assemble(("Healthy. ", "bold green"), diagnosis.examined))
         return
     count = len(diagnosis.findings)
     console.print(Text.assemble((f"{count} finding{'s' if count > 1 else ''}. ", "bold yellow"), diagnosis.examined))
     for number, one in enumerate(diagnosis.findings, start=1):
-        console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {one.sentence}"))
+        known = run is not None and run.table is not None
+        sentence = with_names(one.sentence, run.state_name, run.actions) if run is not None and known else one.sentence
+        console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {sentence}"))
         console.print(Text.assemble(("   Mend: ", "bold"), one.mend))
+        flags = flags_of(one.mend, given=run is not None and run.config.get("dataset") is not None)
+        if flags:
+            console.print(Text.assemble(("   Flags: ", "bold"), ", ".join(flags)))
+
+
+def left(path: Path) -> Diagnosis | None:
+    """What can be said of a run that did not finish; None where that is nothing, or its files are no run's."""
+    try:
+        with understood(path):
+            return diagnose_unfinished(path)
+    except IrlGymError:
+        return None
 
 
 def main(arguments: Arguments) -> int:
     """Read the run, and say what there is."""
-    console, unfinished = Console(soft_wrap=True), None
+    console, unfinished, run = Console(soft_wrap=True), None, None
     try:
-        diagnosis = diagnose_run(read_run(arguments.run))
+        with understood(arguments.run):
+            run = read_run(arguments.run)
+            diagnosis = diagnose_run(run)
     except IrlGymError as error:
-        unfinished = Text.assemble((type(error).__name__, "bold red"), f": {error}")
-        diagnosis = diagnose_unfinished(arguments.run) if isinstance(error, RunIncomplete) else None
-        Console(stderr=True, soft_wrap=True).print(unfinished)
+        unfinished = error
+        diagnosis = left(arguments.run) if isinstance(error, RunIncomplete) else None
+        print_error(error)
     if diagnosis is None:
         return 2
-    show(diagnosis, console)
+    show(diagnosis, console, run)
     return 0 if diagnosis.healthy and unfinished is None else 1
 
 

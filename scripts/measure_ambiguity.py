@@ -1,15 +1,16 @@
 """Measure how long the instruments of `irl_gym.ambiguity` take, and what they find in Ng & Russell's first experiment.
 
-python scripts/measure_ambiguity.py
+For example:
+    python scripts/measure_ambiguity.py
 """
 
-import argparse
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import tyro
 from rich.console import Console
 from rich.table import Table
 
@@ -108,11 +109,15 @@ def show(title: str, columns: Row, rows: Iterator[Row]) -> None:
     Console(width=150).print(table)
 
 
-if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+def main() -> None:
+    """Measure all of it, and print tables."""
     show("membership, Ng & Russell's 5 x 5 grid", ("reward", "finding"), of_membership())
     spread = "least / middle / largest width"
     show("feasible widths (bar: 60 s on 2 cores)", ("table", "options", "processes", "seconds", spread), of_widths())
     show("optimal faces", ("table", "learner", "unique", "states that differ", "largest width", "seconds"), of_faces())
     columns = ("table", "options", "pieces", "programs", "seconds", "lambda_0", "gap / f(0)")
     show("lambda path", columns, of_paths())
+
+
+if __name__ == "__main__":
+    tyro.cli(main, description=__doc__)

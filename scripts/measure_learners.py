@@ -1,11 +1,11 @@
 """Measure what FeatureLP and TrajectoryLP recover, and how long FeatureLP takes on large tables.
 
+For example:
     python scripts/measure_learners.py
 
 Scores are exact true values of the policy greedy under the recovered reward: random = 0, expert = 1, gamma 0.99.
 """
 
-import argparse
 import multiprocessing
 import resource
 import time
@@ -15,6 +15,7 @@ from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
+import tyro
 from rich.console import Console
 from rich.table import Table
 
@@ -105,8 +106,8 @@ def large(size: int, centres: int, sample: int) -> tuple[str, ...]:
     return f"{size**2:,}", f"{centres**2}", f"{sample:,}", f"{seconds:.1f} s", f"{peak:.2f} GB", gap
 
 
-if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+def main() -> None:
+    """Measure all of it, and print tables."""
     first = Table(
         "environment", "features", "paper: score / worst tie", "violated", "margin_cap='auto'", "violated", title="FeatureLP"
     )
@@ -120,3 +121,7 @@ if __name__ == "__main__":
         with multiprocessing.get_context("spawn").Pool(1) as pool:
             third.add_row(*pool.apply(large, settings))
     Console(width=150).print(third)
+
+
+if __name__ == "__main__":
+    tyro.cli(main, description=__doc__)

@@ -1,11 +1,11 @@
 """Measure the speed and memory bars: linear programs, planning, vectorised stepping, PPO, import.
 
+For example:
     python scripts/measure_speed.py
 
 Each measurement runs in a process of its own, for its peak memory. Ratios are of one run.
 """
 
-import argparse
 import multiprocessing
 import resource
 import subprocess
@@ -16,6 +16,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import tyro
 from rich.console import Console
 from rich.table import Table
 from stable_baselines3.common.env_util import make_vec_env
@@ -111,10 +112,14 @@ MEASUREMENTS: list[tuple[str, str, Callable[..., str], tuple, dict]] = [
 ]
 
 
-if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+def main() -> None:
+    """Measure all of it, and print tables."""
     shown = Table("what", "bar", "measured")
     for name, bar, measure, arguments, settings in MEASUREMENTS:
         with multiprocessing.get_context("spawn").Pool(1) as pool:
             shown.add_row(name, bar, pool.apply(measure, arguments, settings))
     Console(width=150).print(shown)
+
+
+if __name__ == "__main__":
+    tyro.cli(main, description=__doc__)

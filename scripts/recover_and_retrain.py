@@ -9,42 +9,28 @@ For example:
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.text import Text
 
 from irl_gym import IrlGymError, recover_and_retrain
 from irl_gym.arguments import OPTIONS, Arguments
 from irl_gym.report import print_report
+from irl_gym.terminal import print_error, stage_bars
 
 
 def main(arguments: Arguments, command: Sequence[str]) -> int:
     """Run the loop and print the report; the command is kept, so that the run can be had again."""
     console = Console()
-    bar = Progress(
-        TextColumn("{task.description:14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
-        console=console, disable=not console.is_terminal,
-    )  # fmt: skip
-    tasks: dict[str, Any] = {}
-
-    def show(stage: str, share: float) -> None:
-        if stage not in tasks:
-            tasks[stage] = bar.add_task(stage, total=1.0)
-        bar.update(tasks[stage], completed=share)
-
     try:
-        with bar:
+        with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the report is piped
             asked = arguments.experiment()
             report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show, command)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
         return 130
     except IrlGymError as error:
-        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
-        Console(stderr=True, soft_wrap=True).print(text)
+        print_error(error)
         return 2
     print_report(report, console)
     return 0

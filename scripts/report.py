@@ -7,14 +7,17 @@ For example:
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.arguments import OPTIONS, UNSET
 from irl_gym.page.report import write_report
-from irl_gym.runs import read_run
+from irl_gym.runs import read_run, understood
+from irl_gym.terminal import check_writable, print_error
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class Arguments:
 
     run: Path
     """The folder of the run."""
-    out: Path | None = None
+    out: Annotated[Path | None, UNSET] = None
     """The file; the default is report.html in that folder."""
 
 
@@ -31,14 +34,16 @@ def main(arguments: Arguments) -> int:
     """Read the run and write its page."""
     out = arguments.out or arguments.run / "report.html"
     try:
-        write_report(read_run(arguments.run), out)
+        if arguments.out is not None:
+            check_writable(out)
+        with understood(arguments.run):
+            write_report(read_run(arguments.run), out)
     except (IrlGymError, OSError) as error:
-        text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
-        Console(stderr=True, soft_wrap=True).print(text)
+        print_error(error)
         return 2
     Console(soft_wrap=True).print(Text(f"Wrote {out}."))
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))

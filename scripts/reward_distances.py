@@ -1,4 +1,11 @@
-"""Measure what EPIC, DARD and STARC say of rewards: figures of their papers, invariances, and how they follow regret."""
+"""Measure what EPIC, DARD and STARC say of rewards: figures of their papers, invariances, and how they follow regret.
+
+Exits with 0 where every bar holds, 1 where one fails, 2 for numbers that cannot be measured with.
+
+For example:
+    python scripts/reward_distances.py
+    python scripts/reward_distances.py --only invariance bound --mdps 50
+"""
 
 import sys
 from collections.abc import Iterable
@@ -13,6 +20,7 @@ from rich.table import Table
 from scipy.stats import rankdata
 
 from irl_gym import distances as known
+from irl_gym.checks import checked_number
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.gridworlds import gridworld, gridworld_rewards
 from irl_gym.distances.random_rewards import random_mdp, random_reward, redistributed, shaped
@@ -45,6 +53,10 @@ class Arguments:
     """Random MDPs, each with a pair of rewards, for the rank correlation with regret."""
     seed: int = 0
     """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        for name, least in (("mdps", 1), ("pairs", 2), ("seed", 0)):
+            checked_number(name, getattr(self, name), f"a whole number of at least {least}", least=least, whole=True)
 
 
 def show(title: str, columns: Iterable[str], names: Iterable[str], cells: Iterable[Iterable[str]]) -> None:
@@ -110,9 +122,14 @@ def bound(given: Arguments) -> bool:
     return bool((share <= 1).all())
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Measure what was asked."""
     given = tyro.cli(Arguments, description=__doc__)
     bars = {"figure": figure, "invariance": invariance, "regret": regret, "bound": bound}
     kept = {name: bars[name](given) for name in given.only}
     CONSOLE.print(", ".join(f"{name}: {'holds' if kept[name] else 'FAILS'}" for name in kept))
-    sys.exit(not all(kept.values()))
+    return 0 if all(kept.values()) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

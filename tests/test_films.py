@@ -16,7 +16,7 @@ from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.loop import Loop
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3, ValueIteration
-from irl_gym.run_folder import read_json
+from irl_gym.run_folder import read_json, write_json
 
 QUICK = {"episodes": 5, "eval_episodes": 5}
 
@@ -112,6 +112,13 @@ def test_the_same_seed_makes_the_same_film(taxi, tmp_path):
         for made in (taxi, again)
     )
     assert first == second
+
+
+def test_a_kind_of_pictures_that_leads_out_of_the_folder_is_refused(line, tmp_path):
+    told = read_json(line.out / "films" / "agent.json")
+    write_json(tmp_path / "agent.json", {**told, "kind": "/../../../secret"})
+    with pytest.raises(ValueError, match="expected one of webp, png"):
+        load_film(tmp_path / "agent.json")
 
 
 @pytest.mark.parametrize(

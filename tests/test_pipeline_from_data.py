@@ -10,6 +10,7 @@ from rich.console import Console
 from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrated import most_frequent
 from irl_gym.demonstrations import Episode, empirical_policy
+from irl_gym.diagnosis import diagnose_run
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import DatasetMismatch, InvalidParameter
 from irl_gym.experiment import Experiment
@@ -20,6 +21,8 @@ from irl_gym.metrics import policy_value
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
 from irl_gym.report import print_report
+from irl_gym.run_folder import read_json
+from irl_gym.runs import read_run
 from irl_gym.worlds import discounted_mean
 
 DATA = "irl_gym/frozenlake-v1-expert-v0"
@@ -68,6 +71,22 @@ def from_noise(noisy, tmp_path_factory):
     return recover_and_retrain(
         Experiment(None, GAMMA, learner=SOFT, **data_of(noisy), **FEW), tmp_path_factory.mktemp("noise") / "run"
     )
+
+
+@pytest.fixture(scope="module")
+def two(source, tmp_path_factory):
+    """A run from two episodes."""
+    root = tmp_path_factory.mktemp("two")
+    write_minari(episodes_of(source)[:2], "me/two-v0", gym.make("FrozenLake-v1", **LAKE), root=root, algorithm="two")
+    return recover_and_retrain(
+        Experiment(None, GAMMA, dataset="me/two-v0", dataset_root=str(root), learner=SOFT, **FEW), root / "run"
+    )
+
+
+def printed(report):
+    console = Console(file=io.StringIO(), width=300)
+    print_report(report, console)
+    return " ".join(console.file.getvalue().split())
 
 
 def episodes_of(report):
@@ -202,3 +221,59 @@ def test_there_is_no_score_when_the_expert_earns_no_more_than_random_actions(sou
     console = Console(file=io.StringIO(), width=200)
     print_report(report, console)
     assert "There is no score: the expert earns no more than random actions." in " ".join(console.file.getvalue().split())
+
+
+def test_two_episodes_make_no_score_and_the_metrics_say_why(two):
+    assert [row["score"] for row in two.metrics["policies"].values()] == [None] * 3
+    assert two.metrics["expert_value"] == {"episodes": 2, "low": None, "high": None}
+    assert "the mean of 2 episodes, too few" in two.metrics["score_reason"]
+    assert two.metrics["reward"]["worst_tie_regret_share"] is None
+
+
+def test_many_episodes_make_a_score_and_the_metrics_hold_the_interval(from_data):
+    known, row = from_data.metrics["expert_value"], from_data.metrics["policies"]["expert"]
+    assert from_data.metrics["score_reason"] is None and row["score"] == 1 and known["episodes"] == 400
+    assert 0 < known["high"] - row["value"] == pytest.approx(row["value"] - known["low"])
+
+
+def test_the_report_of_two_episodes_says_whose_they_are_and_makes_no_score_of_them(two):
+    text = printed(two)
+    for words in (
+        "expert, 2 episodes",
+        "There is no score: the expert's value",
+        "worst-tie regret │ not known",
+        "FrozenLake-v1, ",
+    ):
+        assert words in text, words
+    assert "it gains" not in text and "score 0.99" not in text
+
+
+def test_the_doctor_finds_that_two_episodes_are_few(two, from_data):
+    held = [[one["name"] for one in read_json(made.out / "diagnosis.json")["findings"]] for made in (two, from_data)]
+    assert "few-episodes" in held[0] and "few-episodes" not in held[1]
+    assert diagnose_run(read_run(two.out)).to_json() == read_json(two.out / "diagnosis.json")
+
+
+def test_the_report_counts_what_the_doctor_found(two):
+    count = len(read_json(two.out / "diagnosis.json")["findings"])
+    assert count > 1 and f"The doctor found {count} things: python scripts/doctor.py --run {two.out}" in printed(two)
+
+
+def test_one_episode_is_all_there_is_where_nothing_is_left_to_chance(tmp_path):
+    plain = {"map_name": "4x4", "is_slippery": False}
+    first = recover_and_retrain(Experiment("FrozenLake-v1", GAMMA, plain, episodes=1, **FEW), tmp_path / "first")
+    asked = Experiment(None, GAMMA, learner=SOFT, dataset=DATA, dataset_root=str(first.out / "dataset"), **FEW)
+    made = recover_and_retrain(asked, tmp_path / "run")
+    value = made.metrics["policies"]["expert"]["value"]
+    assert made.metrics["policies"]["expert"]["score"] == 1 and value == pytest.approx(GAMMA**5)
+    assert made.metrics["expert_value"] == {"episodes": 1, "low": value, "high": value}
+
+
+def test_policies_that_do_the_same_are_judged_by_the_same_episodes(source):
+    expert, agent = (np.load(source.out / f"{name}.npz")["actions"] for name in ("expert", "agent_policy"))
+    acting = [0, 1, 2, 3, 4, 6, 8, 9, 10, 13, 14]  # the others are holes and the goal
+    np.testing.assert_array_equal(expert[acting], agent[acting])
+    rows = source.metrics["policies"]
+    assert [rows["expert"][key] for key in ("mean_return", "return_low")] == [
+        rows["retrained"][key] for key in ("mean_return", "return_low")
+    ]

@@ -119,7 +119,8 @@ def test_a_run_draws_its_figures(runs, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_metrics_have_the_documented_keys(runs, name):
     metrics = runs(name).metrics
-    assert set(metrics) == {"policies", "reward", "training", "demonstrations", "table"}
+    known = {"policies", "score_reason", "expert_value", "reward", "training", "demonstrations", "table"}
+    assert set(metrics) == known
     assert set(metrics["policies"]) == {"expert", "random", "retrained"}
     row = {"value", "score", "mean_return", "return_low", "return_high", "agreement"}
     assert all(set(one) == row for one in metrics["policies"].values())

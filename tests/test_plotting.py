@@ -17,7 +17,6 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.layouts import grid_layout
 from irl_gym.plotting import (
     Curve,
-    arrival_reward,
     draw_learning_curve,
     draw_policies,
     draw_returns,
@@ -111,14 +110,6 @@ def test_grid_layout_reads_goals_and_pits_of_a_grid_world():
 def test_grid_layout_leaves_terminal_copies_off_the_map(lake):
     values = np.arange(18.0)  # 16 cells and two copies
     assert lake.layout.cells(values).tolist() == np.arange(16.0).reshape(4, 4).tolist()
-
-
-def test_arrival_reward_is_found_when_arrivals_explain_the_steps(lake):
-    np.testing.assert_allclose(arrival_reward(lake.R, lake.mdp), np.eye(16)[15], atol=1e-8)
-
-
-def test_arrival_reward_is_none_when_the_action_matters(cliff):
-    assert arrival_reward(cliff.R, cliff.mdp) is None
 
 
 def test_draw_rewards_writes_the_reward_of_each_cell(lake):

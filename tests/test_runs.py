@@ -1,5 +1,6 @@
 """What a run leaves is read back whole; what is missing, damaged or newer is named."""
 
+import csv
 import json
 import shlex
 import shutil
@@ -92,6 +93,15 @@ def test_the_metrics_csv_is_read_in_one_line(finished, run):
     pandas = pytest.importorskip("pandas")
     table = pandas.read_csv(finished / "metrics.csv").pivot(index="policy", columns="metric", values="value")
     assert table.loc["retrained", "value"] == run.metrics["policies"]["retrained"]["value"]
+
+
+def test_the_metrics_csv_tells_runs_apart_and_holds_the_rewards_numbers(finished, run):
+    with (finished / "metrics.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    told = {(row["env"], float(row["gamma"]), int(row["seed"])) for row in rows}
+    assert told == {(run.env_id, run.config["gamma"], run.config["seed"])}
+    reward = {row["metric"]: row["value"] for row in rows if row["policy"] == "reward"}
+    assert float(reward["l1_norm"]) == run.metrics["reward"]["l1_norm"] and reward["expert_optimal"] == "1"
 
 
 def test_tensorboard_has_sb3s_scalars_and_the_curve(finished, run):

@@ -72,6 +72,8 @@ class Case:
     """The true reward, where it is known."""
     shaped: bool = False
     """Is the agent retrained on the expected advantage?"""
+    judged: Mapping[str, Any] = field(default_factory=dict)
+    """The content of a run's metrics.json; empty where nothing was judged."""
 
     @cached_property
     def on_states(self) -> bool:

@@ -7,6 +7,7 @@ from irl_gym.diagnoses.findings import Finding, counted, named
 from irl_gym.diagnoses.unseen import entered
 from irl_gym.dynamic_programming import occupancy
 from irl_gym.metrics import TIE_TOLERANCE, policy_value, random_value, worst_tie
+from irl_gym.scores import FEWEST, Scale
 
 MUCH = 0.05
 """Share of what can be had over random actions; a loss above it is worth a sentence."""
@@ -45,6 +46,26 @@ def poor_expert(case: Case) -> Finding | None:
         f"{random:.4g}; it loses most in {named(states)}.",
         mend,
         states,
+    )
+
+
+def few_episodes(case: Case) -> Finding | None:
+    """The value of an expert that is known by episodes only is their mean: too few make no scale for a score."""
+    known = case.judged.get("expert_value") or {}
+    if known.get("episodes") is None:
+        return None
+    rows, high = case.judged["policies"], known["high"]
+    expert = rows["expert"]["value"]
+    half = float("inf") if high is None else high - expert
+    scale = Scale(rows["random"]["value"], expert, half=half, episodes=known["episodes"])
+    if not scale.few:
+        return None
+    about = "" if scale.needed is None else f": about {max(scale.needed, FEWEST):,}, if more are like these"
+    about = f": {FEWEST} at the least" if half == float("inf") else about
+    return Finding(
+        "few-episodes",
+        f"There is no score: {scale.reason}.",
+        f"More episodes of the expert{about}.",
     )
 
 

@@ -1,8 +1,9 @@
-"""What was asked: the configuration, what differs from the defaults first, and how to run it again."""
+"""What was asked: what the command said, or what differs from the defaults; the configuration; and how to run it again."""
 
 import inspect
 import json
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from irl_gym.experiment import Experiment
@@ -16,13 +17,20 @@ from irl_gym.runs import Run
 PARTS = {kind.__name__: kind for kind in (FiniteLP, FeatureLP, TrajectoryLP, ValueIteration, SB3)}
 """Parts of an experiment whose defaults are known."""
 _NO_DEFAULT = object()
+AGAIN = "runs/again"
+"""The folder of the run that is made again."""
 
 
 def asked(run: Run) -> Section:
     """The configuration as a table, and the command."""
-    changed = [(key, written(value)) for key, value in differing(run.config)]
+    command = run.version.get("command")
+    if command is None:
+        changed = [(key, written(value)) for key, value in differing(run.config)]
+        lead = "Listed is what differs from the defaults; everything else is below."
+    else:
+        changed = [("environment", str(run.env_id or run.config.get("dataset"))), *typed(command)]
+        lead = "Listed is what the command asked for; everything else, most of it by default, is below."
     whole = json.dumps(dict(run.config), indent=1, sort_keys=True)
-    lead = "Listed is what differs from the defaults; everything else is below."
     return Section("asked", "What was asked", lead, (), "asked", {"lines": changed, "raw": whole})
 
 
@@ -30,10 +38,38 @@ def reproduce(run: Run) -> Section:
     """The command that makes the run again; of a run from Python, the lines of Python."""
     title = "Run it again"
     if run.command is not None:
-        lead = "This command makes the same run again: the same seed gives the same files."
-        return Section("reproduce", title, lead, (), "command", {"command": run.command})
+        lead = (
+            "In the environment where irl_gym is installed this command makes the same run again, in a folder of its own: the "
+            "same seed gives the same files."
+        )
+        again = shlex.join(into_new_folder(run.version["command"]))
+        return Section("reproduce", title, lead, (), "command", {"command": again})
     lead = "The run was started from Python. These lines make it again:"
     return Section("reproduce", title, lead, (), "command", {"command": python_lines(run.config)})
+
+
+def into_new_folder(command: Sequence[str]) -> list[str]:
+    """The command with another --out: in the run's own folder everything is there already, and would be kept."""
+    kept: list[str] = []
+    skipped = False
+    for word in map(str, command):
+        if not skipped and word != "--out" and not word.startswith("--out="):
+            kept.append(word)
+        skipped = word == "--out"
+    return [*kept, "--out", AGAIN]
+
+
+def typed(command: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Flags and values of a command, in its order, but for the environment and the folder, which are told elsewhere."""
+    flag, values = None, list[str]()
+    for word in [*map(str, command), "--"]:
+        if not word.startswith("--"):
+            values.append(word)
+            continue
+        if flag is not None and flag not in ("--env-id", "--out"):
+            yield flag, " ".join(values) or "yes"
+        flag, equals, value = word.partition("=")
+        values = [value] if equals else []
 
 
 def differing(config: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -1,20 +1,23 @@
 """Rewards, values and policies side by side: what is true, and what was learned. Axes: S states, A actions."""
 
 import numpy as np
+from scipy.stats import spearmanr
 
-from irl_gym._typing import StateMask, Vector
+from irl_gym._typing import Indices, StateMask, Vector
+from irl_gym.arrivals import paid_on_arrival
 from irl_gym.linear_reward import LinearReward
 from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, bars, spread, telling
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent
-from irl_gym.plotting import arrival_reward
+from irl_gym.page.written import aligned, counted, number, percent
 from irl_gym.rewards import TabularReward
 from irl_gym.runs import Run
 
 MOST_ROWS = 40
 """Rows of the table of states in which the agent deviates."""
+FEW = 4
+"""Payments of different sizes that are counted one by one."""
 
 
 def rewards(run: Run, scene: Scene | None) -> Section:
@@ -60,13 +63,13 @@ def reward_panel(name: str, title: str, reward: TabularReward, scene: Scene) -> 
     """A reward on a map, or as sorted bars."""
     table = scene.mdp
     R = reward.values
-    if R.ndim == 2 and (found := arrival_reward(R, table)) is not None:
-        R = np.where(np.abs(found) < 1e-9 * np.abs(found).max(), 0.0, found)  # what the least squares leave
+    if R.ndim == 2 and (found := paid_on_arrival(R, table)) is not None:
+        R = found
     if R.ndim == 1:
         told = f"Paid on arrival in a state, {spread(R[table.reachable])}."
         return of_states(name, title, R, scene, told, scale=panels.REWARDS, centred=True, shown=table.reachable)
     acting = scene.acting
-    told = f"Paid for a step, by state and action, {spread(R[acting])}."
+    told = f"Paid for a step, by state and action, {_counts(R[acting])}."
     if scene.place is not None and maps.has_crosses(scene.place):
         told += " Each cell has one field for each move."
         return maps.crosses(name, title, scene.place, R, caption=told, shown=acting)
@@ -82,6 +85,14 @@ def reward_panel(name: str, title: str, reward: TabularReward, scene: Scene) -> 
     return bars(name, title, R.ravel()[order], names, what="reward", caption=told, unit="reward of a step")
 
 
+def _counts(values: np.ndarray) -> str:
+    """Which numbers there are, and how often, where they are few; else the least and the largest."""
+    found, times = np.unique(np.round(values, 9), return_counts=True)
+    if found.size > FEW:
+        return spread(values)
+    return ", ".join(f"{number(one)} in {counted(int(n), 'step')}" for one, n in zip(found, times, strict=True))
+
+
 def of_states(
     name: str, title: str, values: Vector, scene: Scene, caption: str, *, scale: str, centred: bool, shown: StateMask,
     unit: str = "reward", alike: np.ndarray | None = None,
@@ -94,7 +105,7 @@ def of_states(
     rows = np.flatnonzero(shown & np.isfinite(values))
     order = rows[telling(values[rows])]
     caption = f"{caption} {_left_out(order.size, rows.size, 'states')}"
-    return bars(name, title, values[order], scene.names(order), what=unit, caption=caption, unit=unit)
+    return bars(name, title, values[order], scene.names(order), what=unit, caption=caption, unit=unit, alike=alike)
 
 
 def values(scene: Scene) -> Section:
@@ -127,11 +138,18 @@ def values(scene: Scene) -> Section:
             panels.dots(
                 "value-both", "Each state under both rewards", true["value-expert"][1][judged], learned[judged],
                 scene.names(np.flatnonzero(judged)), labels=("expert's value, true reward", "expert's value, learned reward"),
-                caption="A point for each state in which the expert acts. A rising cloud: the learned reward ranks states as "
-                "the true one does.",
+                caption="A point for each state in which the expert acts. Where the cloud rises, the learned reward ranks "
+                f"states as the true one does. {_ranked(true['value-expert'][1][judged], learned[judged])}",
             )
         )  # fmt: skip
     return Section("values", "Values", lead, made)
+
+
+def _ranked(true: Vector, learned: Vector) -> str:
+    """How far two values (n,) put states in one order."""
+    if min(np.ptp(true), np.ptp(learned)) <= 0:
+        return "One of the two values is the same everywhere, so there is no order to compare."
+    return f"Rank correlation: {float(np.asarray(spearmanr(true, learned))[0]):.2f}, where 1 is the same order and 0 none."
 
 
 def _value(name: str, title: str, V: Vector, scene: Scene, told: str, alike: np.ndarray | None = None) -> Panel:
@@ -156,15 +174,26 @@ def policies(scene: Scene) -> Section:
     right = int((judged & ~off).sum())
     share = percent(right / max(int(judged.sum()), 1))
     of = counted(int(judged.sum()), "state")
-    told = f"In {right:,} of {of} ({share}) the agent takes an action of the expert's, or an optimal one."
-    lead = f"{told} {'Where it does not, the cell is shaded and the action listed below.' if off.any() else ''}"
+    good = "an optimal action" if (scene.good == scene.optimal)[judged].all() else "one of the expert's actions"
+    told = f"In {right:,} of {of} ({share}) the agent takes {good}."
+    where = "the cell is shaded and the action listed below" if scene.place is not None else "the action is listed below"
+    lead = f"{told} Where it does not, {where}." if off.any() else told
     rows = np.flatnonzero(off)
     rows = rows[np.argsort(-scene.lost[rows], kind="stable")]
     shown = {
-        "deviations": [_deviation(scene, int(row)) for row in rows[:MOST_ROWS]],
+        "deviations": _deviations(scene, rows[:MOST_ROWS]),
         "left": max(rows.size - MOST_ROWS, 0),
     }
     return Section("policies", "Policies", lead, list(policy_panels(scene)), "policies", shown)
+
+
+def _deviations(scene: Scene, rows: Indices) -> list[dict[str, str]]:
+    """The table of states (n,) in which the agent deviates."""
+    lost, behind = aligned(scene.lost[rows]), aligned(scene.behind[rows])
+    return [
+        {**_deviation(scene, int(row)), "lost": once, "behind": after}
+        for row, once, after in zip(rows, lost, behind, strict=True)
+    ]
 
 
 def _deviation(scene: Scene, row: int) -> dict[str, str]:
@@ -176,7 +205,6 @@ def _deviation(scene: Scene, row: int) -> dict[str, str]:
         "expert": told(chosen(scene.expert)[row]) if scene.seen[row] else "not seen",
         "optimal": told(scene.optimal[row]),
         "agent": scene.run.actions[int(scene.agent[row].argmax())],
-        "lost": number(float(scene.lost[row]), 3),
     }
 
 

@@ -16,15 +16,18 @@ from irl_gym.page import compared, panels
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
+from irl_gym.page.proof import ROUNDING
 from irl_gym.page.report import page_title, policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.training import curves
-from irl_gym.page.written import number, percent, seconds
+from irl_gym.page.written import number, percent, score_of, seconds
 from irl_gym.runs import Run
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26
+NONE = "not there"
+"""In place of an empty cell: the run has no such number."""
 
 
 def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
@@ -52,16 +55,39 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
         _doctors(named),
     ]
     kept = [section for section in sections if section is not None]
-    facts = [(letter, f"{run_title(run)} ({run.path.name})") for letter, run in named.items()]
+    places = run_places(named)
+    facts = [(letter, f"{run_title(run, places[letter])} ({run.path.name})") for letter, run in named.items()]
     context = {"title": f"{len(runs)} runs side by side", "facts": facts, "sentence": _sentence(named), "sections": kept}
     data = {"figures": specs(kept), "slider": None, "episodes": {}}
     write_page(path, "compare.html", context, data, SCRIPTS)
 
 
-def run_title(run: Run) -> str:
+def run_places(named: Mapping[str, Run]) -> dict[str, str]:
+    """What the environment of each run is called: its id, with the arguments where runs of one id differ in them."""
+    given = {letter: dict(run.config.get("env_kwargs") or {}) for letter, run in named.items()}
+    told = {}
+    for letter, run in named.items():
+        same = [given[other] for other, one in named.items() if page_title(one) == page_title(run)]
+        keys = [
+            key
+            for key in dict.fromkeys(key for one in same for key in one)
+            if any(one.get(key) != same[0].get(key) for one in same)
+        ]
+        differing = ", ".join(f"{key}={written(given[letter][key])}" for key in keys if key in given[letter])
+        told[letter] = page_title(run) + (f" ({differing or 'no arguments'})" if keys else "")
+    return told
+
+
+def run_title(run: Run, place: str) -> str:
     """Environment, learner and seed."""
     learner = (run.config.get("learner") or {}).get("type", "")
-    return f"{page_title(run)}, {learner}, seed {run.config.get('seed')}"
+    return f"{place}, {learner}, seed {run.config.get('seed')}"
+
+
+def one_world(named: Mapping[str, Run]) -> bool:
+    """Are all runs of the same environment with the same discount, so that their values can be compared?"""
+    worlds = {(page_title(run), written(run.config.get("env_kwargs") or {}), run.config["gamma"]) for run in named.values()}
+    return len(worlds) == 1
 
 
 def _sentence(named: Mapping[str, Run]) -> str:
@@ -69,21 +95,28 @@ def _sentence(named: Mapping[str, Run]) -> str:
     scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
-        return "None of these runs has a score: no expert earns more than random actions."
+        return "None of these runs has a score; each run's own page says why."
+    if not one_world(named):
+        each = "; ".join(f"run {letter} {score_of(score)}" for letter, score in scores.items())
+        return (
+            f"Scores of the retrained agents: {each}. Random actions are 0, the expert is 1. The environments differ, so a "
+            "score says how near each agent comes to its own expert, not which run is better."
+        )
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
-    if number(known[best], 3) == number(known[worst], 3):
-        return f"The retrained agents are equally good, with a score of {number(known[best], 3)}."
+    if score_of(known[best]) == score_of(known[worst]):
+        return f"The retrained agents are equally good, with a score of {score_of(known[best])}."
     return (
-        f"The retrained agent of run {best} has the best score, {number(known[best], 3)}; that of run {worst} the worst, "
-        f"{number(known[worst], 3)}. Random actions are 0, the expert is 1."
+        f"The retrained agent of run {best} has the best score, {score_of(known[best])}; that of run {worst} the worst, "
+        f"{score_of(known[worst])}. Random actions are 0, the expert is 1."
     )
 
 
 def _results(named: Mapping[str, Run]) -> Section:
     """One row a number, one column a run."""
-    columns = [dict(_numbers(run)) for run in named.values()]
+    places = run_places(named)
+    columns = [dict(_numbers(run, places[letter])) for letter, run in named.items()]
     keys = list(dict.fromkeys(key for column in columns for key in column))
-    rows = [[key, *(column.get(key, "") for column in columns)] for key in keys]
+    rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
     return _table("results", "Results", "Every number is under the true reward of its own environment.", named, rows)
 
 
@@ -92,11 +125,11 @@ def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: lis
     return Section(name, title, lead, (), "compare", shown)
 
 
-def _numbers(run: Run) -> Iterator[tuple[str, str]]:
+def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
     """What the table of results says of a run."""
     policies, reward = run.metrics["policies"], run.metrics["reward"]
     told = {name: policy_row(name, row) for name, row in policies.items()}
-    yield "environment", page_title(run)
+    yield "environment", place
     yield "score of the retrained agent", told["retrained"]["score"]
     for name in ("expert", "retrained", "random"):
         yield f"value, {told[name]['name']}", told[name]["value"]
@@ -107,8 +140,9 @@ def _numbers(run: Run) -> Iterator[tuple[str, str]]:
     if reward.get("worst_tie_regret_share") is not None:
         yield "lost by the worst tie", percent(max(reward["worst_tie_regret_share"], 0.0))
     yield "expert optimal under the reward", "yes" if reward["expert_optimal"] else "no"
-    steps = run.metrics["training"].get("steps_to_0.9")
-    yield "environment steps to a score of 0.9", "not reached" if steps is None else f"{steps:,}"
+    if told["retrained"]["score"] is not None:
+        steps = run.metrics["training"].get("steps_to_0.99")
+        yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
     spent = [record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"]
     yield "time of all stages", seconds(sum(spent))
 
@@ -118,10 +152,7 @@ def _learning(named: Mapping[str, Run]) -> Section:
     title, trained = "Learning curves", {letter: run for letter, run in named.items() if len(run.curve.steps)}
     if not trained:
         return Section("learning", title, "The agents were planned exactly, not trained.")
-    same = (
-        len({(page_title(run), written(run.config.get("env_kwargs") or {}), run.config["gamma"]) for run in named.values()})
-        == 1
-    )
+    same = one_world(named)
     series, levels = {}, {}
     for letter, run in trained.items():
         policies = run.metrics["policies"]
@@ -132,7 +163,7 @@ def _learning(named: Mapping[str, Run]) -> Section:
         series[f"run {letter}"] = (run.curve.steps, values, None)
         levels = {"expert": high, "random": low} if same else {"expert": 1.0, "random": 0.0}
     if not series:
-        return Section("learning", title, "No run has a score to draw: no expert earns more than random actions.")
+        return Section("learning", title, "No run has a score to draw.")
     what = "discounted value from the start" if same else "score"
     told = "the expert's and random actions' levels are dashed" if same else "random actions are 0, the expert is 1"
     ends = "; ".join(f"{name} ends at {number(values[-1])}" for name, (_, values, _) in series.items())
@@ -143,13 +174,14 @@ def _learning(named: Mapping[str, Run]) -> Section:
 def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section:
     """The learned rewards, and once each environment's true one."""
     made: list[Panel] = []
+    places = run_places(named)
     for letter, run in named.items():
         scene = scenes[letter]
         if scene is None:
             section = compared.rewards(run, None)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
-            made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {page_title(run)}", scene.learned, scene))
+            made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))
     lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
     return Section("rewards", "Learned rewards", lead, made)
 
@@ -172,11 +204,18 @@ def _differences(named: Mapping[str, Run]) -> Section:
     """What differs between the configurations."""
     flat = [dict(_leaves(run.config)) for run in named.values()]
     keys = list(dict.fromkeys(key for one in flat for key in one))
-    rows = [[key, *(written(one[key]) if key in one else "" for one in flat)] for key in keys if not _alike(key, flat)]
+    rows = [[key, *(_entry(one, key) for one in flat)] for key in keys if not _alike(key, flat)]
     if not rows:
         return Section("differences", "What differs", "The runs have the same configuration.")
     lead = f"Of the configuration {len(rows)} entries differ; the other {len(keys) - len(rows)} are the same in all runs."
     return _table("differences", "What differs", lead, named, rows)
+
+
+def _entry(leaves: Mapping[str, Any], key: str) -> str:
+    """A value of a configuration, in words where it is none."""
+    if key not in leaves:
+        return NONE
+    return "none" if leaves[key] in (None, {}, []) else written(leaves[key])
 
 
 def _alike(key: str, flat: Sequence[Mapping[str, Any]]) -> bool:
@@ -204,14 +243,22 @@ def _proofs(named: Mapping[str, Run]) -> Section:
     """The numbers of the certificates."""
     held = [run.certificate for run in named.values()]
     rows = [
-        [told, *(number(one[key]) if one.get(key) is not None else "" for one in held)]
+        [told, *(_proof(one, key) for one in held)]
         for key, told in CERTIFIED.items()
         if any(one.get(key) is not None for one in held)
     ]
     margins = [np.array([one for one in cert.get("margin", []) if one is not None], dtype=float) for cert in held]
     if any(one.size for one in margins):
-        rows.append(["margins", *(panels.spread(one) if one.size else "" for one in margins)])
+        rows.append(["margins", *(panels.spread(one) if one.size else NONE for one in margins)])
     return _table("certificate", "Certificates", "What each learned reward proves.", named, rows)
+
+
+def _proof(held: Mapping[str, Any], key: str) -> str:
+    """A number of a certificate, in words where it has none: without a cap is the paper's own program."""
+    if held.get(key) is None:
+        return "none" if key == "margin_cap" and key in held else NONE
+    rounding = key == "duality_gap" and held[key] <= ROUNDING * max(1.0, abs(held.get("objective") or 0.0))
+    return "0, to rounding" if rounding else number(held[key])
 
 
 def _doctors(named: Mapping[str, Run]) -> Section:

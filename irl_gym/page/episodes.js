@@ -36,12 +36,13 @@
 
   function withPictures(stage, pictures, moments) {
     const image = document.createElement("img");
-    image.alt = "";
+    image.alt = "The environment at the start";
     stage.append(image);
     const shown = moments.reduce((known, one) => known.concat(one.picture ?? known.at(-1) ?? 0), []);
     return (at) => {
       const next = pictures[Math.min(shown[at], pictures.length - 1)];
       if (image.src !== next) image.src = next;
+      image.alt = `The environment: ${moments[at].text}`;
     };
   }
 
@@ -52,8 +53,8 @@
   }
 
   function sentence(moment, at, last) {
-    const where = `Step ${at} of ${last}. ${moment.text}`;
-    if (at === 0) return `${where}. The start.`;
+    const where = `Step ${at} of ${last}: ${moment.text}`;
+    if (at === 0) return `Step 0 of ${last}, the start: ${moment.text}.`;
     return `${where}, after ${moment.action}. Paid ${moment.pay}, ${moment.total} so far; by the learned reward ${moment.learned}, ${moment.learnedTotal} so far.`;
   }
 
@@ -94,6 +95,8 @@
       window.clearInterval(timer);
       timer = 0;
       button.textContent = "Play";
+      button.setAttribute("aria-label", `${title}: play`);
+      told.setAttribute("aria-live", "polite");
     }
 
     function start() {
@@ -101,6 +104,8 @@
       const speed = Number(box.querySelector("[data-do=speed]").value);
       timer = window.setInterval(() => go(at + 1), 1000 / speed);
       button.textContent = "Pause";
+      button.setAttribute("aria-label", `${title}: pause`);
+      told.setAttribute("aria-live", "off"); // read out a step at a time, not a film
     }
 
     const actions = {

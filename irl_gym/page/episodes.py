@@ -12,7 +12,7 @@ from irl_gym.films import Film, Moment
 from irl_gym.page.maps import geometry
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, sum_of
+from irl_gym.page.written import counted, sentence_of, state_called, sum_of
 from irl_gym.runs import Run
 
 MOST_BYTES = 700_000
@@ -67,7 +67,7 @@ def _told(name: str, film: Film) -> dict[str, Any]:
         "title": title,
         "said": said,
         "last": min(len(film.steps), MOST_MOMENTS) - 1,
-        "why": film.without_frames,
+        "why": sentence_of(film.without_frames),
     }
 
 
@@ -82,7 +82,7 @@ def _pictures(film: Film) -> tuple[list[str], int]:
 def _moment(moment: Moment, film: Film, every: int, place: Any) -> dict[str, Any]:
     """One row of the table of steps, and what is drawn."""
     told: dict[str, Any] = {
-        "text": moment.text,
+        "text": state_called(moment.text),
         "action": moment.action_name or "",
         "pay": "" if moment.true_reward is None else sum_of(moment.true_reward),
         "learned": "" if moment.learned_reward is None else sum_of(moment.learned_reward, 3),

@@ -4,6 +4,7 @@
 const CONFIG = { displayModeBar: false, displaylogo: false, responsive: false, scrollZoom: false, doubleClick: false };
 const MOST_ROWS = 400;
 const NARROW = 480;
+const READABLE = 25; // pixels of a cell
 
 function resolved(value, style) {
   if (typeof value === "string") {
@@ -59,6 +60,17 @@ function heightOf(spec, width) {
   return Math.round(Math.min(Math.max(inner * spec.aspect, 70), 620) + 46);
 }
 
+// In small cells letters shrink, and numbers that could not be read are left to the table of numbers.
+function fitLetters(figure, width) {
+  const map = figure.data.find((one) => one.name === "values" && one.z);
+  const letters = figure.data.find((one) => one.name === "letters");
+  if (!map && !letters) return;
+  const columns = map ? map.z[0].length : figure.data[0].z[0].length;
+  const cell = Math.max(width - 90, 120) / Math.max(columns, 1);
+  if (letters) letters.textfont.size = Math.round(Math.min(Math.max(0.27 * cell, 7), 11));
+  if (map && map.texttemplate && cell < READABLE) map.texttemplate = "";
+}
+
 function drawFigure(name) {
   const spec = DATA.figures[name];
   const box = document.getElementById(name);
@@ -69,6 +81,7 @@ function drawFigure(name) {
     Object.assign(figure.data[2], off);
   }
   const width = box.clientWidth;
+  fitLetters(figure, width);
   if (width < NARROW) {
     figure.layout.font = { ...figure.layout.font, size: 11 };
   }
@@ -90,6 +103,19 @@ window.addEventListener("resize", () => {
   waiting = window.setTimeout(drawAll, 150);
 });
 themed.push(drawAll);
+
+// Paper is light: the style sheet sees to the page, and the figures are drawn again.
+let worn;
+window.addEventListener("beforeprint", () => {
+  worn = document.documentElement.dataset.theme;
+  document.documentElement.dataset.theme = "light";
+  drawAll();
+});
+window.addEventListener("afterprint", () => {
+  if (worn) document.documentElement.dataset.theme = worn;
+  else delete document.documentElement.dataset.theme;
+  drawAll();
+});
 window.drawn = drawAll();
 
 // The numbers behind a figure, as a table that is made when it is opened.
@@ -98,7 +124,8 @@ function cellText(value) {
 }
 
 function plain(text) {
-  const made = new DOMParser().parseFromString(String(text), "text/html"); // undoes the escapes of plotted text
+  const line = String(text).replaceAll("<br>", " ");
+  const made = new DOMParser().parseFromString(line, "text/html"); // undoes the escapes of plotted text
   return made.body.textContent;
 }
 

@@ -16,7 +16,7 @@ from irl_gym._typing import ActionSets, Matrix, StateMask
 from irl_gym.cells import Cells
 from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TransitionTable
-from irl_gym.page.panels import REWARDS, Panel, axis, blank, plotted
+from irl_gym.page.panels import DIVERGING, REWARDS, Panel, axis, blank, plotted
 from irl_gym.page.written import listed
 
 MOST_NUMBERS = 144
@@ -75,8 +75,8 @@ class Map:
         return "" if self.stride == 1 else f" One of every {self.stride} rows and columns is drawn."
 
 
-def ground(place: Map, wrong: np.ndarray | None = None) -> go.Figure:
-    """The lowest layer: what each cell is; (rows, columns) `wrong` cells are shaded."""
+def ground(place: Map, wrong: np.ndarray | None = None, covered: np.ndarray | None = None) -> go.Figure:
+    """The lowest layer: what each cell is; (rows, columns) `wrong` cells are shaded, and `covered` ones left to a value."""
     layout, every = place.layout, place.stride
     kinds = np.zeros(layout.shape, dtype=int)
     for letter, kind in (("G", 2), ("H", 3), ("E", 4)):
@@ -87,8 +87,9 @@ def ground(place: Map, wrong: np.ndarray | None = None) -> go.Figure:
     steps = np.linspace(0, 1, len(GROUND) + 1)
     scale = [[float(at), f"var(--{name})"] for i, name in enumerate(GROUND) for at in (steps[i], steps[i + 1])]
     figure = blank(xaxis=_side(place, 1), yaxis=_side(place, 0), plot_bgcolor="var(--seam)")
+    drawn = np.where(np.zeros_like(kinds, dtype=bool) if covered is None else covered, np.nan, kinds)
     figure.add_heatmap(
-        z=listed(kinds[::every, ::every]), zmin=-0.5, zmax=len(GROUND) - 0.5, colorscale=scale, showscale=False,
+        z=listed(drawn[::every, ::every]), zmin=-0.5, zmax=len(GROUND) - 0.5, colorscale=scale, showscale=False,
         hoverinfo="skip", name="ground", **_spacing(place),
     )  # fmt: skip
     return figure
@@ -99,16 +100,16 @@ def heat(
     shown: StateMask | None = None, alike: np.ndarray | None = None,
 ) -> Panel:  # fmt: skip
     """Colours of values (S,), none where they are NaN or not `shown`; colours and digits suit `alike`, if given."""
-    figure, every = ground(place), place.stride
     at = np.array(place.cells(np.asarray(values, dtype=float)))
     hidden = place.layout.blocked if shown is None else place.layout.blocked | ~place.cells(shown)
     at[hidden] = np.nan
+    figure, every = ground(place, covered=np.isfinite(at)), place.stride
     suited = at if alike is None else alike
     low, high = ends(suited, centred=centred)
     numbers = place.layout.n_cells <= MOST_NUMBERS
     figure.add_heatmap(
-        z=listed(at[::every, ::every], 4), zmin=low, zmax=high, colorscale=scale, name="values",
-        colorbar=COLOUR_BAR,
+        z=listed(at[::every, ::every], 4), zmin=low, zmax=high, name="values",
+        colorscale=DIVERGING if scale == REWARDS else scale, colorbar=COLOUR_BAR,
         texttemplate=f"%{{z:{number_format(suited)}}}" if numbers else "",
         hovertemplate=_hover(place, "%{z}"), **_spacing(place),
     )  # fmt: skip
@@ -128,7 +129,7 @@ def crosses(name: str, title: str, place: Map, R: Matrix, *, caption: str, shown
     thirds = (np.arange(3 * max(rows, columns)) - 1) / 3
     figure.add_heatmap(
         z=listed(at, 4), x=listed(thirds[: 3 * columns]), y=listed(thirds[: 3 * rows]), zmin=low, zmax=high,
-        colorscale=REWARDS, name="values", xgap=0.5, ygap=0.5,
+        colorscale=DIVERGING, name="values", xgap=0.5, ygap=0.5,
         colorbar=COLOUR_BAR,
         hovertemplate="row %{y:.0f}, column %{x:.0f}: %{z}<extra></extra>",
     )  # fmt: skip
@@ -255,7 +256,7 @@ def _letters(figure: go.Figure, place: Map, *, centred: np.ndarray) -> None:
     if max(layout.shape) > MOST_ARROWS or not (layout.letters != "").any():
         return
     spots = np.argwhere(layout.letters != "")
-    off = np.where(centred[spots[:, 0], spots[:, 1]], 0.0, 0.33)
+    off = np.where(centred[spots[:, 0], spots[:, 1]], 0.0, 0.36)
     figure.add_scatter(
         x=listed(spots[:, 1] - off), y=listed(spots[:, 0] - off), text=[str(layout.letters[r, c]) for r, c in spots],
         mode="text", hoverinfo="skip", name="letters", textfont={"color": "var(--letter)", "size": 11, "weight": 700},

@@ -4,6 +4,7 @@ Colours are names of the style sheet, `var(--name)`, which the page's script loo
 """
 
 import html
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,9 +18,11 @@ ROW = 19
 """Pixels of a bar."""
 REWARDS, VALUES, WIDTHS = "RdBu", "Viridis", "Cividis"
 """Colour scales, all safe for the colour-blind; rewards are red below 0 and blue above."""
+DIVERGING = [[i / 10, f"var(--reward{i})"] for i in range(11)]
+"""The colours of rewards: of the style sheet, so that 0 is pale where the page is light and dark where it is dark."""
 MOST_BARS = 40
-LONGEST = 38
-"""Characters of a name beside a bar."""
+LINE, LINES = 39, 3
+"""Characters of a line of a name beside a bar, and lines at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,19 @@ def axis(**more: Any) -> dict[str, Any]:
     return {**plain, "fixedrange": True, "tickfont": {"color": "var(--muted)"}, **more}
 
 
+def named(text: str) -> str:
+    """A name beside a bar, in lines: where names are long it is often their ends that tell them apart, so none is cut short."""
+    lines = textwrap.wrap(text, LINE) or [""]
+    if len(lines) > LINES:
+        return plotted(text, LINE)
+    return "<br>".join(plotted(one) for one in lines)
+
+
+def bar_axis() -> dict[str, Any]:
+    """The axis of names: names that are numbers stay names."""
+    return axis(autorange="reversed", type="category", showgrid=False, ticklabelstandoff=4)
+
+
 def plotted(text: str, longest: int | None = None) -> str:
     """Text of a run inside a figure: Plotly would read tags in it. What is too long is cut in the middle; ends tell apart."""
     if longest is not None and len(text) > longest:
@@ -82,19 +98,33 @@ def telling(values: np.ndarray, most: int = MOST_BARS) -> np.ndarray:
     return np.concatenate([order[: most - most // 2], order[-(most // 2) :]])
 
 
-def bars(name: str, title: str, values: np.ndarray, names: Sequence[str], *, what: str, caption: str, unit: str) -> Panel:
-    """Horizontal bars, largest first, of values (n,) that are chosen and in order; all of them are `what`."""
-    labels = _different([plotted(one, LONGEST) for one in names])
+def bars(
+    name: str, title: str, values: np.ndarray, names: Sequence[str], *, what: str, caption: str, unit: str,
+    alike: np.ndarray | None = None,
+) -> Panel:  # fmt: skip
+    """Horizontal bars, largest first, of values (n,) that are chosen and in order; all of them are `what`.
+
+    The scale has room for all values `alike`, if given, so that figures can share one.
+    """
+    labels = _different([named(one) for one in names])
     colours = ["var(--learned)" if value >= 0 else "var(--bad)" for value in values]
     figure = blank(
-        xaxis=axis(title={"text": unit}, zeroline=True), yaxis=axis(autorange="reversed", showgrid=False, ticklabelstandoff=4),
-        bargap=0.25,
+        xaxis=axis(title={"text": unit}, zeroline=True, **({} if alike is None else {"range": _span(alike)})),
+        yaxis=bar_axis(), bargap=0.25,
     )  # fmt: skip
     figure.add_bar(
         x=listed(values), y=labels, orientation="h", marker={"color": colours},
         hovertemplate=f"%{{y}}: %{{x}}<extra>{plotted(what)}</extra>",
     )  # fmt: skip
-    return Panel(name, title, caption, figure, height=70 + ROW * max(len(labels), 3))
+    lines = max((label.count("<br>") for label in labels), default=0)
+    return Panel(name, title, caption, figure, height=70 + (ROW + 11 * lines) * max(len(labels), 3))
+
+
+def _span(values: np.ndarray) -> list[float]:
+    """The ends of a scale for bars, which begin at 0."""
+    finite = values[np.isfinite(values)]
+    low, high = float(finite.min(initial=0.0)), float(finite.max(initial=0.0))
+    return [1.05 * low, 1.05 * high] if high > low else [-1.0, 1.0]
 
 
 def _different(labels: list[str]) -> list[str]:
@@ -112,12 +142,12 @@ def grouped_bars(
 ) -> Panel:
     """Bars of several series beside one another, one group a name."""
     figure = blank(
-        xaxis=axis(title={"text": unit}), yaxis=axis(autorange="reversed", showgrid=False, ticklabelstandoff=4),
+        xaxis=axis(title={"text": unit}), yaxis=bar_axis(),
         barmode="group", showlegend=True, legend=below(), margin={"l": 8, "r": 8, "t": 34, "b": 8},
     )  # fmt: skip
     for (series_name, values), colour in zip(series.items(), ("expert", "learned", "bad", "warn"), strict=False):
         figure.add_bar(
-            x=listed(values), y=[plotted(one, LONGEST) for one in names], orientation="h", name=plotted(series_name),
+            x=listed(values), y=[named(one) for one in names], orientation="h", name=plotted(series_name),
             marker={"color": f"var(--{colour})"}, hovertemplate="%{y}: %{x}",
         )  # fmt: skip
     return Panel(name, title, caption, figure, height=110 + len(names) * len(series) * 17)
@@ -134,7 +164,7 @@ def dots(
     """A point for each state: x (n,) against y (n,)."""
     figure = blank(xaxis=axis(title={"text": labels[0]}), yaxis=axis(title={"text": labels[1]}))
     figure.add_scatter(
-        x=listed(x), y=listed(y), mode="markers", text=[plotted(one, LONGEST) for one in names],
+        x=listed(x), y=listed(y), mode="markers", text=[plotted(one) for one in names],
         marker={"color": "var(--learned)", "size": 7, "opacity": 0.6},
         hovertemplate="%{text}: %{x}, %{y}<extra></extra>",
     )  # fmt: skip

@@ -6,14 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.diagnoses.spoken import flags_of
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
+from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
 
 GOOD, MUCH = 0.9, 0.05
 """A score that is good, and a share lost by the worst tie that is much."""
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
+STAGES_LEAD = (
+    "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
+    "neither is timed here."
+)
 MOST_STATES = 12
 """States that a finding lists."""
 
@@ -26,10 +31,8 @@ def verdict(run: Run) -> dict[str, Any]:
     figures = [
         {
             "label": "score of the retrained agent",
-            "value": "none" if score is None else number(score, 3),
-            "note": "random actions are 0, the expert is 1"
-            if score is not None
-            else "the expert earns no more than random actions",
+            "value": score_of(score),
+            "note": "random actions are 0, the expert is 1" if score is not None else _no_score(run),
             "mood": "plain" if score is None else "good" if score >= GOOD else "bad",
         },
         {
@@ -48,6 +51,11 @@ def verdict(run: Run) -> dict[str, Any]:
     return {"sentence": _sentence(run, score, share, optimal), "figures": figures}
 
 
+def _no_score(run: Run) -> str:
+    """Why there is no score."""
+    return str(run.metrics.get("score_reason") or "the expert earns no more than random actions")
+
+
 def _proved(reward: Mapping[str, Any]) -> str:
     gap = reward.get("duality_gap")
     if gap is None:
@@ -60,15 +68,16 @@ def _proved(reward: Mapping[str, Any]) -> str:
 def _sentence(run: Run, score: float | None, share: float | None, optimal: bool) -> str:
     agent = run.metrics["policies"]["retrained"]
     earned = (
-        f"The agent that saw only the recovered reward reaches {percent(score)} of the way from random actions to the expert"
+        f"The agent that saw only the recovered reward has a score of {score_of(score)}: random actions are 0, the expert is 1"
         if score is not None
-        else f"The agent that saw only the recovered reward has value {number(agent['value'])}; the expert earns no more than "
-        "random actions, so there is no score"
+        else f"The agent that saw only the recovered reward has value {number(agent['value'])}, and there is no score, as "
+        f"{_no_score(run)}"
     )
     tie = (
         ""
         if share is None
-        else f"; the unluckiest policy that is best under that reward would lose {percent(max(share, 0.0))}"
+        else f"; the unluckiest policy that is best under that reward would lose {percent(max(share, 0.0))} of what the expert "
+        "has over random actions"
         if share > 1e-9
         else "; every policy that is best under that reward is as good as the expert"
     )
@@ -101,7 +110,11 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     if "margin_cap" in held:
         yield "Margin cap", "none: Ng & Russell's own program" if cap is None else number(cap)
     gap = held.get("duality_gap")
-    best = "" if gap is None else f", at most {max(gap, 0.0):.1e} below the best possible"
+    objective = abs(held.get("objective") or 0.0)
+    nothing = gap is not None and gap <= ROUNDING * max(1.0, objective)
+    best = (
+        "" if gap is None else ", to rounding the best possible" if nothing else f", at most {gap:.1e} below the best possible"
+    )
     yield "Objective", f"{number(held.get('objective'))}{best}"
     if "lambda_0" in held:
         top = held["lambda_0"]
@@ -153,7 +166,7 @@ def doctor(run: Run) -> Section:
     findings = [_finding(run, one) for one in run.diagnosis.get("findings", ())]
     lead = "What a careful reader would ask of this reward, and what to do about it."
     if not findings:
-        lead = "The doctor has nothing to complain about."
+        lead = f"The doctor has nothing to complain about. {sentence_of(run.diagnosis.get('examined'))}".strip()
     return Section("doctor", title, lead, (), "doctor", {"findings": findings})
 
 
@@ -164,9 +177,15 @@ def _finding(run: Run, found: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": str(found.get("name", "")).replace("_", " ").replace("-", " "),
         "sentence": found.get("sentence", ""),
-        "mend": found.get("mend", ""),
+        "mend": _mend(run, str(found.get("mend", ""))),
         "states": f"{'; '.join(names)}{more}" if names else "",
     }
+
+
+def _mend(run: Run, mend: str) -> str:
+    """A mend, with the flags of the command line that it speaks of."""
+    flags = ", ".join(flags_of(mend, given=run.config.get("dataset") is not None))
+    return f"{mend} On the command line: {flags}." if flags else mend
 
 
 def stages(run: Run) -> Section:
@@ -177,7 +196,7 @@ def stages(run: Run) -> Section:
             continue
         steps = record.get("environment_steps", 0)
         rows.append((name, seconds(record.get("seconds")), f"{steps:,}" if steps else ""))
-    return Section("stages", "Stages", "What was done, and how long it took.", (), "stages", {"rows": rows})
+    return Section("stages", "Stages", STAGES_LEAD, (), "stages", {"rows": rows})
 
 
 def table_facts(run: Run) -> Section:

@@ -14,7 +14,7 @@ from irl_gym.page.document import write_page
 from irl_gym.page.proof import certificate, doctor, stages, table_facts, verdict
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.written import interval, number, percent
+from irl_gym.page.written import interval, number, percent, score_of
 from irl_gym.runs import Run
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
@@ -87,6 +87,9 @@ def policies_table(run: Run) -> Section:
         f"Value: discounted, from the start, {where}. Score: random actions are 0, the expert is 1. Mean return: undiscounted, "
         "sampled, with a 95 % interval."
     )
+    told = run.metrics.get("expert_value") or {}
+    if told.get("episodes"):
+        note += f" The expert's value is the mean of its {told['episodes']:,} episodes."
     if known:
         note += " Agreement: share of states with one of the expert's actions, or an optimal one where it is optimal."
     shown = {"rows": rows, "known": known, "note": note}
@@ -104,7 +107,7 @@ def policy_row(name: str, row: Mapping[str, Any]) -> dict[str, str]:
     return {
         "name": {"retrained": "retrained agent"}.get(name, name),
         "value": number(row["value"]),
-        "score": "none" if row["score"] is None else number(row["score"], 3),
+        "score": score_of(row["score"]),
         "returns": interval(row),
         "agreement": "none" if row["agreement"] is None else percent(row["agreement"]),
     }

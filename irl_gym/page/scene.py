@@ -11,9 +11,11 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
 from irl_gym.dynamic_programming import backup, evaluate_policy, policy_iteration, tied
+from irl_gym.evaluation import good_actions
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import TIE_TOLERANCE
 from irl_gym.page.maps import Map
+from irl_gym.page.written import state_called
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.runs import Run
@@ -95,12 +97,15 @@ class Scene:
         return tied(self.best[1], TIE_TOLERANCE * float(np.abs(self.table.reward.values).max()))
 
     @cached_property
+    def good(self) -> ActionSets:
+        """(S, A) the actions that the agreement of metrics.json counts: the optimal ones, or a poor expert's own."""
+        errs = self.run.metrics.get("demonstrations", {}).get("episodes_only", False)
+        return good_actions(self.mdp, self.table.reward, None if errs else self.run.expert, self.best[1])
+
+    @cached_property
     def deviates(self) -> StateMask:
-        """(S,) states in which the agent's likeliest action is none of the expert's, and not optimal either."""
-        taken = self.agent.argmax(axis=1)
-        rows = np.arange(self.mdp.n_states)
-        fine = (chosen(self.expert) & self.seen[:, None])[rows, taken] | self.optimal[rows, taken]
-        return self.acting & ~fine
+        """(S,) states in which the agent's likeliest action is none of the good ones."""
+        return self.acting & ~self.good[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)]
 
     @cached_property
     def lost(self) -> Vector:
@@ -108,14 +113,19 @@ class Scene:
         V, Q = self.best
         return np.where(self.acting, V - Q[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)], 0.0)
 
+    @cached_property
+    def behind(self) -> Vector:
+        """(S,) what the agent loses from there on against acting best, under the true reward."""
+        return np.where(self.acting, self.best[0] - evaluate_policy(self.mdp, self.table.reward, self.agent), 0.0)
+
     def value(self, reward: TabularReward, policy: Matrix) -> Vector:
         """(S,) a policy's value; NaN in states that are not judged."""
         return np.where(self.acting, evaluate_policy(self.mdp, reward, policy), np.nan)
 
     def name(self, row: int) -> str:
         """What a state is called."""
-        ended = " (ended)" if row in self._copies else ""
-        return self.run.state_name(row) + ended
+        ended = " (ended)" if row in self._copies or self.mdp.terminal[row] else ""
+        return state_called(self.run.state_name(row)) + ended
 
     @cached_property
     def _copies(self) -> frozenset[int]:

@@ -5,8 +5,9 @@ stands for lambda above lambda_0, where R = 0. Everything is worked out here; th
 Axes: S states, A actions, k pieces.
 """
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, axis, blank, plotted, telling
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of
+from irl_gym.page.written import listed, number, sentence_of, too_large
 from irl_gym.rewards import TabularReward
 
 MOST_PIECES = 240
@@ -27,6 +28,8 @@ MOST_PIECES = 240
 MOST_CELLS = 90_000
 """Pieces times cells of a map that the page holds."""
 BARS = 24
+STATES = re.compile(r"(?<=of )states? (\d+(?:, \d+)*)")
+"""States as the sentences of a path name them, by row."""
 TITLE = "The price of a large reward"
 NO_PATH = "How the reward changes with lambda, the price of its norm, was not worked out for this run."
 
@@ -72,15 +75,28 @@ def _sentences(changes: Sequence[Mapping[str, Any]], k: int) -> list[str]:
     return told if len(told) == k + 1 else [""] * (k + 1)
 
 
+def _named(sentence: str, scene: Scene) -> str:
+    """A sentence with its states called as the figures call them."""
+
+    def called(found: re.Match[str]) -> str:
+        return " and ".join(f"({scene.name(int(row))})" for row in found[1].split(", "))
+
+    if not set(map(int, re.findall(r"\d+", " ".join(STATES.findall(sentence))))) <= set(range(scene.mdp.n_states)):
+        return sentence
+    return STATES.sub(called, sentence)
+
+
 def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     """The section, and what its script shows at each position; None where there is no path."""
     path = scene.run.lambda_path
     if path is None or len(path["rewards"]) == 0:
         told = scene.run.stages.get("ambiguity", {})
         why = told.get("no_path") or told.get("no_ambiguity")
-        return Section("lambda", TITLE, f"{NO_PATH} {sentence_of(why)}".strip()), None
+        short = too_large(why, "how the reward changes with lambda", scene.mdp.n_states)
+        return Section("lambda", TITLE, short or f"{NO_PATH} {sentence_of(why)}".strip()), None
     size = scene.place.layout.n_cells if scene.place is not None else 3 * BARS
     pieces = Pieces.of_path(path, min(MOST_PIECES, MOST_CELLS // size))
+    pieces = replace(pieces, changes=tuple(_named(one, scene) for one in pieces.changes))
     sets = greedy_sets(scene, pieces.rewards)
     shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
     data = {

@@ -29,13 +29,15 @@ nameTheme();
 // A box that scrolls is a stop for the keyboard; one that does not is none.
 function stops() {
   document.querySelectorAll(".scroll").forEach((box) => {
+    box.classList.remove("more");
     const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
+    box.classList.toggle("more", scrolls);
     if (scrolls) box.setAttribute("tabindex", "0");
     else box.removeAttribute("tabindex");
   });
 }
 window.addEventListener("resize", stops);
-document.addEventListener("toggle", stops, true);
+document.addEventListener("toggle", () => window.setTimeout(stops), true); // after what is opened was filled
 stops();
 
 const copy = document.getElementById("copy");

@@ -9,9 +9,9 @@ from irl_gym.curves import Curve
 from irl_gym.page import panels
 from irl_gym.page.compared import of_states
 from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
-from irl_gym.page.scene import Scene
+from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of
+from irl_gym.page.written import listed, number, sentence_of, too_large
 from irl_gym.runs import Run
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
@@ -27,14 +27,18 @@ def learning(run: Run) -> Section:
     made = [_values(curve, policies)]
     if np.isfinite(curve.mean).any():
         made.append(_returns(curve, policies))
-    taken = run.metrics["training"].get("steps_to_0.9")
-    told = (
-        f"From {taken:,} environment steps on the score stays at 0.9 or more."
-        if taken is not None
-        else "The score did not stay at 0.9 or more."
-    )
-    lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward. {told}"
+    lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward.{_settled(run)}"
     return Section("learning", "Learning curve", lead, made)
+
+
+def _settled(run: Run) -> str:
+    """When the agent was as good as it should be; nothing where there is no score."""
+    if run.metrics["policies"]["retrained"]["score"] is None:
+        return ""
+    taken = run.metrics["training"].get("steps_to_0.99")
+    if taken is None:
+        return " The score did not stay at 0.99 or more."
+    return f" From {taken:,} environment steps on the score stays at 0.99 or more."
 
 
 def _values(curve: Curve, policies: Mapping[str, Any]) -> Panel:
@@ -97,32 +101,49 @@ def widths(scene: Scene) -> Section:
     if scene.run.widths is None:
         made = scene.run.stages.get("ambiguity", {})
         why = sentence_of(made.get("no_widths") or made.get("no_ambiguity"))
-        return Section("widths", title, f"How wide the feasible set is was not worked out for this run. {why}".strip())
+        told = too_large(why, "how far rewards can move", scene.mdp.n_states)
+        return Section("widths", title, told or f"How wide the feasible set is was not worked out for this run. {why}".strip())
     found = scene.run.widths
-    width, low, high = (_of_states(found[key], widest) for key, widest in (("width", True), ("low", False), ("high", True)))
+    over = {"width": np.fmax, "low": np.fmin, "high": np.fmax}
+    width, low, high = (_of_states(found[key], scene, which) for key, which in over.items())
     shown = np.isfinite(width) & scene.mdp.reachable
+    of_steps = " Drawn is that of the step which the expert takes." if np.ndim(found["width"]) == 2 else ""
     if not shown.any():
         return Section("widths", title, "No state's reward is bounded by what the expert does.")
     lead = (
-        "All rewards under which the expert is optimal make up the feasible set. The width is how far a state's reward can "
-        "move within it: 0 says that the expert settles it, a wide one that almost anything goes."
+        f"Considered are all rewards within +-{number(_largest_reward(scene.run))} under which the expert is optimal with a "
+        f"margin of at least {_least_margin(scene.run)} in every state that can have one. The width is how far a state's "
+        "reward can move among them: 0 says that the expert settles it, a wide one that almost anything goes."
     )
-    made = [of_states("widths-map", "Feasible width", width, scene, f"Widths {spread(width[shown])}.",
+    made = [of_states("widths-map", "Feasible width", width, scene, f"Widths {spread(width[shown])}.{of_steps}",
                       scale=panels.WIDTHS, centred=False, shown=shown, unit="width")]  # fmt: skip
     if scene.place is not None:
         made += [
-            of_states(f"widths-{key}", name, bound, scene, f"{name} of each state, {spread(bound[shown])}.",
+            of_states(f"widths-{key}", name, bound, scene, f"{name} of each state, {spread(bound[shown])}.{of_steps}",
                       scale=panels.REWARDS, centred=True, shown=shown)
             for key, name, bound in (("low", "Least feasible reward", low), ("high", "Largest feasible reward", high))
         ]  # fmt: skip
     return Section("widths", title, lead, made)
 
 
-def _of_states(values: Any, widest: bool) -> np.ndarray:
-    """(S,) numbers of states; of steps (S, A) the largest or the least over actions, NaN where there is none."""
+def _largest_reward(run: Run) -> float:
+    return float((run.config.get("learner") or {}).get("r_max") or 1.0)
+
+
+def _least_margin(run: Run) -> str:
+    """The margin that the feasible rewards have: half the largest that all states can have at once, as FiniteLP's own cap."""
+    told = "half the largest that all states can have at once"
+    cap = run.certificate.get("margin_cap")
+    own = (run.config.get("learner") or {}).get("margin_cap") == "auto" and isinstance(cap, int | float)
+    return f"{number(cap)}, {told}," if own else told
+
+
+def _of_states(values: Any, scene: Scene, over: np.ufunc) -> np.ndarray:
+    """(S,) numbers of states; of steps (S, A) that of the step the expert takes, the largest or the least where it has several.
+
+    Other steps say little: nothing bounds how bad they are, so their least reward is always the scale's end.
+    """
     array = np.asarray(values, dtype=float)
     if array.ndim == 1:
         return array
-    none = np.isnan(array).all(axis=1)
-    over = np.fmax.reduce(array, axis=1) if widest else np.fmin.reduce(array, axis=1)
-    return np.where(none, np.nan, over)
+    return over.reduce(np.where(chosen(scene.expert) & scene.seen[:, None], array, np.nan), axis=1)

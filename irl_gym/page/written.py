@@ -1,6 +1,7 @@
 """How the page writes numbers: few digits, thousands apart, and a word where there is none."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -30,8 +31,32 @@ def sum_of(value: float, digits: int = 4) -> str:
     return number(0.0 if abs(value) < ROUNDING else value, digits)
 
 
+def score_of(score: Any) -> str:
+    """A score with three decimals, which says 1.000 only of what is 1."""
+    if score is None or not math.isfinite(score):
+        return "none" if score is None else MISSING
+    return "above 0.999" if 0.9995 <= score < 1 - 1e-6 else f"{score:.3f}".replace("-0.000", "0.000")
+
+
+def aligned(values: np.ndarray) -> list[str]:
+    """Numbers of one column: as many decimals as its largest needs, and what is too small for them said in words."""
+    largest = float(np.abs(values).max(initial=0.0))
+    decimals = min(max(3 - math.floor(math.log10(largest)), 0), 12) if largest > 0 else 0
+    least = 10.0**-decimals
+    return [
+        "0"
+        if abs(one) < ROUNDING * max(largest, 1.0)
+        else f"below {least:.{decimals}f}"
+        if 0 < one < least
+        else f"{one:,.{decimals}f}"
+        for one in np.asarray(values, dtype=float).tolist()
+    ]
+
+
 def percent(share: Any) -> str:
-    """A share as per cent with one decimal."""
+    """A share as per cent with one decimal; 100.0 only where nothing is missing."""
+    if share is not None and 0.9995 <= share < 1 - 1e-6:
+        return "over 99.9\u00a0%"
     return (
         MISSING if share is None or not math.isfinite(share) else f"{share:.1%}".replace("%", "\u00a0%").replace("-0.0", "0.0")
     )
@@ -57,10 +82,29 @@ def counted(n: int, singular: str, plural: str | None = None) -> str:
     return f"{n:,} {singular if n == 1 else plural or singular + 's'}"
 
 
+def state_called(name: str) -> str:
+    """What a state is called where names stand alone: a bare number says what it is of, and a flag of 0 or 1 what it says."""
+    if name.isdecimal():
+        return f"state {name}"
+    return (
+        name.removesuffix(", natural 0") + ", no natural"
+        if name.endswith(", natural 0")
+        else name.replace(", natural 1", ", a natural")
+    )
+
+
 def sentence_of(text: Any) -> str:
     """A reason as a sentence: with a capital and a full stop; nothing where there is none."""
     told = str(text or "").strip()
     return told and f"{told[0].upper()}{told[1:]}{'' if told[-1] in '.!?' else '.'}"
+
+
+def too_large(why: Any, what: str, n_states: int) -> str | None:
+    """A short sentence where tables of this size are not examined; None where the reason is another."""
+    found = re.search(r"at most (\d+) and \d+ are examined", str(why or ""))
+    if found is None:
+        return None
+    return f"This table has {n_states:,} states; {what} is worked out for tables of up to {found[1]}."
 
 
 def listed(values: np.ndarray, digits: int = 5) -> Any:

@@ -2,12 +2,19 @@
 
 import os
 import shutil
+import time
+from functools import partial
 
 import pytest
 
 FLAGS = (
     "--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run",
 )  # fmt: skip
+
+
+FITS = """[...document.querySelectorAll('.plot')].every(box =>
+    !box.offsetParent || box.querySelector('.main-svg')?.clientWidth === box.clientWidth)"""
+"""Is every figure drawn for the width that its box has?"""
 
 
 @pytest.fixture(scope="session")
@@ -25,10 +32,18 @@ def browser():
         launched.close()
 
 
-def opened(browser, path, width, **more):
-    """A page; `page.wrong` lists errors of the console and of scripts, `page.asked` what was requested."""
-    page = browser.new_page(viewport={"width": width, "height": 844}, **more)
-    page.wrong, page.asked = [], []
+def until(page, expression):
+    """Wait for an expression to hold. Playwright's own wait evaluates text inside the page, which the page's policy forbids."""
+    deadline = time.monotonic() + 20
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, expression
+        page.wait_for_timeout(30)
+
+
+def opened(browser, path):
+    """A page; `wrong` lists errors of the console and of scripts, `asked` what was requested, `until` waits."""
+    page = browser.new_page(viewport={"width": 1280, "height": 844})
+    page.wrong, page.asked, page.until = [], [], partial(until, page)
     page.on("console", lambda said: page.wrong.append(said.text) if said.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))
@@ -39,11 +54,11 @@ def opened(browser, path, width, **more):
 
 @pytest.fixture
 def visit(browser):
-    """Opens a file for one test, which may press what it likes."""
+    """Opens a file for one test alone: for what depends on how a page is when it is opened."""
     pages = []
 
-    def visited(path, *, width=1280, **more):
-        pages.append(opened(browser, path, width, **more))
+    def visited(path):
+        pages.append(opened(browser, path))
         return pages[-1]
 
     yield visited
@@ -53,14 +68,24 @@ def visit(browser):
 
 @pytest.fixture(scope="module")
 def look(browser):
-    """Opens a file once for all tests that only look at it."""
+    """Opens a file once for all tests of a module, since loading Plotly takes the time. Who presses puts things right first.
+
+    A page that is asked for in another width or other colours is changed, as a window is, and drawn again. Nothing that any
+    test does may make an error.
+    """
     pages = {}
 
-    def looked(path, *, width=1280):
-        if (path, width) not in pages:
-            pages[path, width] = opened(browser, path, width)
-        return pages[path, width]
+    def looked(path, *, width=1280, color_scheme="light"):
+        if path not in pages:
+            pages[path] = opened(browser, path)
+        page = pages[path]
+        page.emulate_media(color_scheme=color_scheme, reduced_motion="reduce")
+        if page.viewport_size["width"] != width:
+            page.set_viewport_size({"width": width, "height": 844})
+            page.until(FITS)
+        return page
 
     yield looked
+    assert [page.wrong for page in pages.values() if page.wrong] == []
     for page in pages.values():
         page.close()

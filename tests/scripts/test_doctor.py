@@ -1,5 +1,6 @@
 """The script as a person runs it, on runs that went well, badly, and not to their end."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -43,6 +44,13 @@ def test_a_healthy_run_exits_with_0(runs):
 def test_findings_exit_with_1_and_are_printed_with_their_mends(runs):
     done = doctor(runs / "paper")
     assert done.returncode == 1 and "avoidable-ties" in done.stdout and 'Mend: margin_cap="auto"' in done.stdout
+
+
+def test_mends_are_flags_too_and_states_have_their_names(runs):
+    said = doctor(runs / "paper").stdout
+    assert "Flags: --margin-cap auto, --l1 0" in said and re.search(
+        r"s=(\d+) a=\d \(row \d, column \d; (left|down|right|up)\)", said
+    )
 
 
 def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(runs, tmp_path):

@@ -30,3 +30,10 @@ def test_the_figure_is_printed(small):
 
 def test_an_unknown_measurement_is_refused():
     assert run("--only", "everything").returncode != 0
+
+
+@pytest.mark.parametrize(("flag", "value"), [("--mdps", "0"), ("--pairs", "1"), ("--seed", "-1")])
+def test_numbers_that_cannot_be_measured_with_get_one_clear_line(flag, value):
+    made = run("--only", "bound", flag, value)
+    assert made.returncode == 2 and f"{flag[2:]} is {value}: expected a whole number" in made.stderr
+    assert "Traceback" not in made.stderr

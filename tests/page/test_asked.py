@@ -1,0 +1,46 @@
+"""What the page says was asked, why there is no score, and which flags mend."""
+
+from dataclasses import replace
+
+from page.made_runs import table_run
+
+from irl_gym.page.asked import asked, typed
+from irl_gym.page.proof import doctor, verdict
+
+SCRIPT = ("python", "scripts/recover_and_retrain.py")
+
+
+def test_only_what_was_typed_is_listed(tmp_path):
+    command = [*SCRIPT, "--env-id", "FrozenLake-v1", "--l1", "0.5", "--env-kwargs", "a=1", "b=2", "--no-shaping", "--out", "x"]
+    assert list(typed(command)) == [("--l1", "0.5"), ("--env-kwargs", "a=1 b=2"), ("--no-shaping", "yes")]
+
+
+def test_flags_with_an_equals_sign_are_read_too():
+    assert list(typed([*SCRIPT, "--gamma=0.9", "--out=x", "--seed", "3"])) == [("--gamma", "0.9"), ("--seed", "3")]
+
+
+def test_the_bare_command_lists_the_environment_alone(tmp_path):
+    run = table_run(tmp_path, films=False)
+    bare = replace(run, version={**run.version, "command": [*SCRIPT]})
+    assert asked(bare).shown["lines"] == [("environment", "FrozenLake-v1")]
+
+
+def test_a_run_from_python_lists_what_differs_from_its_defaults(tmp_path):
+    run = table_run(tmp_path, films=False, seed=4)
+    lines = dict(asked(replace(run, version={**run.version, "command": None})).shown["lines"])
+    assert lines["seed"] == "4" and lines["gamma"] == "0.9"
+
+
+def test_the_verdict_says_why_there_is_no_score(tmp_path):
+    run = table_run(tmp_path, films=False)
+    policies = {name: {**row, "score": None} for name, row in run.metrics["policies"].items()}
+    told = verdict(replace(run, metrics={**run.metrics, "policies": policies, "score_reason": "two episodes are few"}))
+    assert "there is no score, as two episodes are few" in told["sentence"]
+    assert told["figures"][0]["note"] == "two episodes are few"
+
+
+def test_the_doctors_mends_name_their_flags(tmp_path):
+    run = table_run(tmp_path, films=False)
+    found = {"name": "ties", "sentence": "Tied.", "mend": 'margin_cap="auto" with l1=0.0.', "states": [], "actions": []}
+    (told,) = doctor(replace(run, diagnosis={"healthy": False, "findings": [found]})).shown["findings"]
+    assert told["mend"].endswith("On the command line: --margin-cap auto, --l1 0.")

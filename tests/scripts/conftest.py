@@ -1,0 +1,28 @@
+"""Scripts as a person runs them, by subprocess, and a run that several tests only read."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PLAN = ("--episodes", "5", "--retrain", "value-iteration")
+
+
+@pytest.fixture(scope="session")
+def script():
+    def run(name, *arguments, cwd):
+        command = [sys.executable, str(ROOT / "scripts" / f"{name}.py"), *map(str, arguments)]
+        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def planned(script, tmp_path_factory):
+    """A folder with a finished run, `plain`, whose agent was planned; to be copied by who changes it."""
+    cwd = tmp_path_factory.mktemp("planned")
+    made = script("recover_and_retrain", *PLAN, "--out", "plain", cwd=cwd)
+    assert made.returncode == 0, made.stderr
+    return cwd

@@ -1,0 +1,96 @@
+"""What the terminal says of a run, line by line, from its numbers alone."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from irl_gym.claims import ENVIRONMENT
+from irl_gym.evaluation import settled_at
+from irl_gym.pipeline import Report
+from irl_gym.report import print_report
+
+CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
+
+
+def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, **reward):
+    """What is printed of a run of FiniteLP with these numbers, on one line."""
+    row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
+    told = {
+        "learner": "FiniteLP", "status": "Optimal within the solver's tolerances.", "expert_optimal": True, "degenerate": False,
+        "worst_tie_regret": 0.0, "worst_tie_regret_share": share, "lambda_0": 2.0, "l1": 0.0, "margin_cap": 1.0,
+        "duality_gap": 0.0, "least_l1_norm": 3.0, "l1_norm": 3.0, "marginless_states": 0, "violated_states": 0,
+        "inseparable_states": 0, "zero": False, "reward_on": "state",
+    } | reward  # fmt: skip
+    metrics = {
+        "policies": {name: row for name in ("expert", "random", "retrained")}, "score_reason": reason, "reward": told,
+        "training": training or {"environment_steps": 4096, "steps_to_0.9": 64, "steps_to_0.99": 2048}, "table": {
+            "horizon": None, "error": 0.0, "exact": True, "reachable": 11, "actions": 4, "method": "Published."},
+        "demonstrations": {"given": False, "episodes_only": False, "episodes": 10, "dataset": "lake-v0"},
+    }  # fmt: skip
+    asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
+    stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
+    console = Console(file=io.StringIO(), width=250)
+    print_report(Report(out, metrics, {}, stages, asked | (config or {}), {}), console)
+    return " ".join(console.file.getvalue().split())
+
+
+def test_the_agent_is_timed_to_nearly_the_whole_score(tmp_path):
+    assert "(score 0.99 or more after 2,048)" in said(tmp_path)
+
+
+def test_an_agent_that_did_not_stay_there_is_told(tmp_path):
+    training = {"environment_steps": 4096, "steps_to_0.9": 64, "steps_to_0.99": None}
+    assert "(did not stay at score 0.99)" in said(tmp_path, training=training)
+
+
+def test_nothing_is_said_of_scores_when_there_is_none(tmp_path):
+    text = said(tmp_path, score=None, reason="the world ended", share=None)
+    assert "There is no score: the world ended." in text and "score 0.99" not in text
+    assert "worst-tie regret │ not known, as there is no score" in text
+
+
+def test_a_run_of_an_earlier_version_has_the_reason_of_its_time(tmp_path):
+    assert "There is no score: the expert earns no more than random actions." in said(tmp_path, score=None, share=None)
+
+
+def test_no_advice_on_ties_is_given_when_the_reward_is_zero(tmp_path):
+    assert "Try" not in said(tmp_path, zero=True, marginless_states=11, inseparable_states=2, share=0.9)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.2, "successors. Try --reward-on state-action."), (0.0, "successors. Nothing is lost by it.")]
+)
+def test_states_it_cannot_settle_are_mended_only_when_something_is_lost(tmp_path, share, words):
+    assert words in said(tmp_path, inseparable_states=1, share=share)
+
+
+@pytest.mark.parametrize(("gap", "words"), [(0.0, "none"), (1e-15, "none"), (1e-8, "at most 1.0e-08")])
+def test_a_gap_of_nothing_is_none(tmp_path, gap, words):
+    assert f"margins short of the most by │ {words}" in said(tmp_path, duality_gap=gap)
+
+
+def test_a_healthy_run_does_not_mention_the_doctor(tmp_path):
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": []}))
+    assert "doctor" not in said(tmp_path)
+
+
+def test_an_unhealthy_run_names_the_doctor(tmp_path):
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [{}]}))
+    assert f"The doctor found 1 thing: python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
+
+
+def test_a_dataset_is_told_with_its_environment(tmp_path):
+    (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0"}))
+    assert said(tmp_path, config={"env_id": None, "dataset": "me/two-v0"}).startswith("Lake-v0, the environment of me/two-v0;")
+
+
+@pytest.mark.parametrize(("good", "steps"), [(0.9, 192), (0.99, 256), (0.4, 64)])
+def test_a_curve_has_settled_after_the_last_time_that_it_was_below(good, steps):
+    assert settled_at(CURVE, 0.0, 1.0, good) == steps
+
+
+def test_a_curve_that_ends_below_has_not_settled():
+    assert settled_at(CURVE[:3], 0.0, 1.0) is None

@@ -1,0 +1,44 @@
+"""What scripts say in a terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from irl_gym.errors import RunIncomplete
+from irl_gym.terminal import print_error, stage_bars
+
+
+def shown(*, terminal):
+    said = io.StringIO()
+    with stage_bars(Console(file=said, force_terminal=terminal, width=100)) as show:
+        for share in (0.0, 0.5, 1.0):
+            show("expert", share)
+        show("reward", 0.25)
+    return said.getvalue()
+
+
+def test_each_stage_has_one_bar_on_a_terminal():
+    last = shown(terminal=True).rpartition("\x1b[2K")[2].splitlines()
+    bars = [line for line in last if " %" in line]
+    assert len(bars) == 2 and "expert" in bars[0] and "100 %" in bars[0] and "reward" in bars[1] and " 25 %" in bars[1]
+
+
+def test_no_bar_is_drawn_where_there_is_no_terminal():
+    assert shown(terminal=False).strip() == ""
+
+
+def test_bars_end_when_the_work_fails():
+    console = Console(file=io.StringIO(), force_terminal=True)
+    with pytest.raises(KeyboardInterrupt), stage_bars(console) as show:
+        show("expert", 0.5)
+        raise KeyboardInterrupt
+    with stage_bars(console) as show:  # a second display on one console would be refused
+        show("expert", 1.0)
+
+
+@pytest.mark.parametrize("error", [RunIncomplete(f"{'long ' * 60}[bold]end"), FileNotFoundError("no such folder")])
+def test_an_error_is_one_line_on_standard_error(capsys, error):
+    print_error(error)
+    said = capsys.readouterr()
+    assert said.out == "" and said.err == f"{type(error).__name__}: {error}\n"

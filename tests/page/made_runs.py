@@ -176,7 +176,7 @@ def stepped_run(path, *, seed=0):
         "regret_error": 0.1, "gap_errors": [0.1], "gaps": [1.0],
     }  # fmt: skip
     metrics = {
-        "policies": policies, "table": None, "training": {"environment_steps": 60_000, "steps_to_0.9": None, "steps_to_0.99": None},
+        "policies": policies, "table": None, "training": {"environment_steps": 60_000, "steps_to_0.99": None},
         "reward": {"learner": "TrajectoryLP", "status": "Optimal.", "rounds": 5, "best_round": 3,
                    **{key: one for key, one in held.items() if not isinstance(one, list)}},
         "demonstrations": {"given": False, "episodes_only": True, "episodes": 10, "dataset": "made-v0"},

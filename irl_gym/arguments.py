@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, cast, get_args
 
 import gymnasium as gym
 from gymnasium import spaces
-from tyro.conf import DisallowNone, OmitArgPrefixes, arg
 
 from irl_gym.choices import (
     KNOWN,
@@ -29,11 +28,7 @@ from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.planners import Planner
-
-UNSET = arg(help_behavior_hint="")
-"""What stands for "not given" is not shown in --help; the text says what happens then."""
-OPTIONS = (OmitArgPrefixes, DisallowNone)
-"""How tyro reads Arguments: groups give no prefix to their flags, and None is not typed."""
+from irl_gym.terminal import UNSET
 
 
 @dataclass(frozen=True)

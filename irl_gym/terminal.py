@@ -1,15 +1,22 @@
 """What all scripts say in a terminal in the same way: how far a stage is, and what went wrong."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
 from rich.text import Text
+from tyro.conf import DisallowNone, OmitArgPrefixes, arg
 
 from irl_gym.errors import InvalidParameter
+
+UNSET = arg(help_behavior_hint="")
+"""What stands for "not given" is not shown in --help; the text says what happens then."""
+OPTIONS = (OmitArgPrefixes, DisallowNone)
+"""How tyro reads arguments: groups of them give no prefix to their flags, and nobody types None."""
 
 
 @contextlib.contextmanager
@@ -40,6 +47,14 @@ def check_writable(out: Path) -> None:
         raise InvalidParameter(f"out is {out}, but there is no folder {out.parent}: expected one that exists. Make it first.")
     if out.is_dir():
         raise InvalidParameter(f"out is {out}, which is a folder: expected a file's name, such as {out / 'page.html'}.")
+
+
+def print_table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]], width: int = 150) -> None:
+    """Figures in rows and columns."""
+    table = Table(*columns, title=title)
+    for row in rows:
+        table.add_row(*row)
+    Console(width=width).print(table)
 
 
 def print_error(error: Exception) -> None:

@@ -10,7 +10,7 @@ For example:
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -23,7 +23,7 @@ from irl_gym.datasets import described
 from irl_gym.demonstrators import Recording
 from irl_gym.experiment import parse_keywords
 from irl_gym.export import Amount, export_dataset
-from irl_gym.terminal import print_error, stage_bars
+from irl_gym.terminal import OPTIONS, UNSET, print_error, stage_bars
 
 
 @dataclass(frozen=True)
@@ -34,25 +34,25 @@ class Arguments:
     """A registered environment; module:id for one of another package."""
     dataset_id: str
     """namespace/name-v0; an id that is taken is never overwritten."""
-    env_kwargs: tuple[str, ...] = ()
+    env_kwargs: Annotated[tuple[str, ...], UNSET] = ()
     """What the environment is made with: name=value ..., or one json object."""
-    start_seeds: tuple[int, ...] = ()
+    start_seeds: Annotated[tuple[int, ...], UNSET] = ()
     """Draw the layouts of resets from these seeds only; 0 fixes the layout of a MiniGrid environment."""
     reveal: tuple[str, ...] = ("known",)
     """Hidden integers that the observation shall show: name=number of values ...; known for those known to be hidden; none."""
-    max_states: int | None = None
+    max_states: Annotated[int | None, UNSET] = None
     """States that an enumeration may find."""
     expert: str = "value-iteration"
     """value-iteration, on the table; ppo, dqn or a2c, trained here; random; or a file: SB3's zip, or an npz of actions."""
     epsilon: float = 0.0
     """Probability of a uniformly random action in place of the expert's."""
-    episodes: int | None = None
+    episodes: Annotated[int | None, UNSET] = None
     """How many; the default is 1,000, or as many as the steps take."""
-    steps: int | None = None
+    steps: Annotated[int | None, UNSET] = None
     """Stop after the episode in which this number of steps is reached."""
-    max_episode_steps: int | None = None
+    max_episode_steps: Annotated[int | None, UNSET] = None
     """Truncate longer episodes; the default is the environment's own limit, or 500 where it has none."""
-    total_timesteps: int | None = None
+    total_timesteps: Annotated[int | None, UNSET] = None
     """Environment steps that an agent is trained for."""
     gamma: float = 0.99
     """Discount that the expert plans or learns with, between 0 and 1."""
@@ -60,7 +60,7 @@ class Arguments:
     """Of everything that is drawn: the same seed gives the same episodes."""
     format: Literal["hdf5", "arrow"] = "hdf5"
     """One file; or a folder an episode, which needs the extra `data`."""
-    root: Path | None = None
+    root: Annotated[Path | None, UNSET] = None
     """Minari's root folder; the default is the one in force."""
 
 
@@ -99,4 +99,4 @@ def main(arguments: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))

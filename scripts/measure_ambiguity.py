@@ -11,8 +11,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 from irl_gym import FiniteLP, policy_iteration, tabulate, value_iteration
 from irl_gym.ambiguity.feasible import membership, sample_feasible
@@ -21,6 +19,7 @@ from irl_gym.ambiguity.uniqueness import optimal_face
 from irl_gym.ambiguity.widths import feasible_widths
 from irl_gym.mdp import TabularMDP
 from irl_gym.ng_russell_2000.experiment_1 import Experiment1
+from irl_gym.terminal import print_table
 
 Row = tuple[str, ...]
 ASKED: dict[str, dict[str, Any]] = {"default": {}, "(4) alone": {"margin": None}, "steps": {"reward_on": "state-action"}}
@@ -101,22 +100,14 @@ def of_paths() -> Iterator[Row]:
             yield name, asked, str(path.n_pieces), str(path.solves), seconds, f"{path.lambda_0:.5f}", gap
 
 
-def show(title: str, columns: Row, rows: Iterator[Row]) -> None:
-    """Print a table."""
-    table = Table(*columns, title=title)
-    for row in rows:
-        table.add_row(*row)
-    Console(width=150).print(table)
-
-
 def main() -> None:
     """Measure all of it, and print tables."""
-    show("membership, Ng & Russell's 5 x 5 grid", ("reward", "finding"), of_membership())
+    print_table("membership, Ng & Russell's 5 x 5 grid", ("reward", "finding"), of_membership())
     spread = "least / middle / largest width"
-    show("feasible widths (bar: 60 s on 2 cores)", ("table", "options", "processes", "seconds", spread), of_widths())
-    show("optimal faces", ("table", "learner", "unique", "states that differ", "largest width", "seconds"), of_faces())
+    print_table("feasible widths (bar: 60 s on 2 cores)", ("table", "options", "processes", "seconds", spread), of_widths())
+    print_table("optimal faces", ("table", "learner", "unique", "states that differ", "largest width", "seconds"), of_faces())
     columns = ("table", "options", "pieces", "programs", "seconds", "lambda_0", "gap / f(0)")
-    show("lambda path", columns, of_paths())
+    print_table("lambda path", columns, of_paths())
 
 
 if __name__ == "__main__":

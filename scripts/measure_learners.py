@@ -1,8 +1,4 @@
 """Measure what FeatureLP and TrajectoryLP recover, and how long FeatureLP takes on large tables.
-
-For example:
-    python scripts/measure_learners.py
-
 Scores are exact true values of the policy greedy under the recovered reward: random = 0, expert = 1, gamma 0.99.
 """
 
@@ -16,8 +12,6 @@ from typing import Any, cast
 import gymnasium as gym
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 from irl_gym import FeatureLP, Simulator, TrajectoryLP, ValueIteration, policy_iteration, tabulate, value_iteration, worst_tie
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
@@ -26,10 +20,10 @@ from irl_gym.features import FeatureMap, OneHot, Unravel
 from irl_gym.metrics import normalised_score, policy_value, random_value
 from irl_gym.planners import tabular_actions
 from irl_gym.policies import Policy
+from irl_gym.terminal import print_table
 from irl_gym.worlds import step_limit
 
 GAMMA = 0.99
-CAPS: tuple[Any, ...] = (None, "auto")
 ENVIRONMENTS: dict[str, tuple[str, dict, tuple[int, ...]]] = {
     "FrozenLake 8x8 slippery": ("FrozenLake-v1", {"map_name": "8x8"}, (8, 8)),
     "Taxi-v4": ("Taxi-v4", {}, (5, 5, 5, 4)),
@@ -69,7 +63,7 @@ def of_features() -> Iterator[tuple[str, ...]]:
         known = Known(name)
         for features, phi in maps(known.shape).items():
             cells = []
-            for cap in CAPS:
+            for cap in (None, "auto"):
                 found = FeatureLP(phi, margin_cap=cap).fit(known.table.mdp, known.expert, states=known.table.states)
                 learned = found.reward.tabular(known.table.states)
                 greedy = policy_iteration(known.table.mdp, learned).policy
@@ -80,7 +74,7 @@ def of_features() -> Iterator[tuple[str, ...]]:
 
 def of_trajectories() -> Iterator[tuple[str, ...]]:
     """Scores of the best round's policy from 500 episodes, three seeds."""
-    for name, cap in product(("Taxi-v4", "FrozenLake 8x8 slippery", "FrozenLake 8x8"), CAPS):
+    for name, cap in product(("Taxi-v4", "FrozenLake 8x8 slippery", "FrozenLake 8x8"), (None, "auto")):
         known = Known(name)
         table, limit = known.table, step_limit(known.env)
         paid: Any = table.payments.entries
@@ -106,21 +100,19 @@ def large(size: int, centres: int, sample: int) -> tuple[str, ...]:
     return f"{size**2:,}", f"{centres**2}", f"{sample:,}", f"{seconds:.1f} s", f"{peak:.2f} GB", gap
 
 
-def main() -> None:
-    """Measure all of it, and print tables."""
-    first = Table(
-        "environment", "features", "paper: score / worst tie", "violated", "margin_cap='auto'", "violated", title="FeatureLP"
-    )
-    second = Table("environment", "gap_cap", "scores, 3 seeds", title="TrajectoryLP, 500 episodes, one-hot")
-    third = Table("states", "features", "S_0", "fit", "peak memory", "relative gap", title="FeatureLP on grids")
-    for shown, lines in ((first, of_features()), (second, of_trajectories())):
-        for line in lines:
-            shown.add_row(*line)
-        Console(width=150).print(shown)
+def of_size() -> Iterator[tuple[str, ...]]:
+    """Each fit in a process of its own, for its peak memory."""
     for settings in ((500, 8, 20_000), (1000, 10, 2_000)):
         with multiprocessing.get_context("spawn").Pool(1) as pool:
-            third.add_row(*pool.apply(large, settings))
-    Console(width=150).print(third)
+            yield pool.apply(large, settings)
+
+
+def main() -> None:
+    """Measure all of it, and print tables."""
+    scores = ("environment", "features", "paper: score / worst tie", "violated", "margin_cap='auto'", "violated")
+    print_table("FeatureLP", scores, of_features())
+    print_table("TrajectoryLP, 500 episodes, one-hot", ("environment", "gap_cap", "scores, 3 seeds"), of_trajectories())
+    print_table("FeatureLP on grids", ("states", "features", "S_0", "fit", "peak memory", "relative gap"), of_size())
 
 
 if __name__ == "__main__":

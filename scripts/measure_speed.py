@@ -1,8 +1,4 @@
 """Measure the speed and memory bars: linear programs, planning, vectorised stepping, PPO, import.
-
-For example:
-    python scripts/measure_speed.py
-
 Each measurement runs in a process of its own, for its peak memory. Ratios are of one run.
 """
 
@@ -11,17 +7,16 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.table import Table
 from stable_baselines3.common.env_util import make_vec_env
 
 from irl_gym import SB3, FiniteLP, TabularVecEnv, policy_iteration, tabulate, value_iteration
+from irl_gym.terminal import print_table
 
 GRID = "irl_gym_envs:irl_gym/GridWorld-v0"
 MEGABYTE = 1024  # of ru_maxrss, which counts kilobytes on Linux
@@ -40,10 +35,9 @@ def linear_program(size: int, gamma: float, **settings) -> str:
     expert = policy_iteration(mdp, R).policy
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
-    result = FiniteLP(**settings).fit(mdp, expert)
+    gap = FiniteLP(**settings).fit(mdp, expert).certificate.duality_gap
     seconds = time.perf_counter() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    gap = result.certificate.duality_gap
     return f"{seconds:.2f} s, peak {peak / MEGABYTE:.0f} MB ({(peak - before) / MEGABYTE:.0f} above before), gap {gap:.0e}"
 
 
@@ -52,23 +46,20 @@ def planning(size: int) -> str:
     mdp, R = grid(size, 0.99)
     start = time.perf_counter()
     solution = value_iteration(mdp, R, tolerance=1e-6, sweeps=50)
-    seconds = time.perf_counter() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
+    seconds, peak = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
     return f"{seconds:.1f} s, error bound {solution.error:.1e}, peak {peak:.0f} MB with the table"
 
 
 def lake(num_envs: int) -> TabularVecEnv:
     """FrozenLake 8x8 as one vector environment."""
-    env = gym.make("FrozenLake-v1", map_name="8x8")
-    table = tabulate(env, gamma=0.99, check_steps=0)
+    table = tabulate(gym.make("FrozenLake-v1", map_name="8x8"), gamma=0.99, check_steps=0)
     return TabularVecEnv(table.mdp, table.reward, num_envs=num_envs, max_episode_steps=200, seed=0)
 
 
 def stepping() -> str:
     """Steps a second of 512 copies under random actions."""
-    env = lake(512)
+    env, actions = lake(512), np.random.default_rng(0).integers(4, size=(1000, 512))
     env.reset()
-    actions = np.random.default_rng(0).integers(4, size=(1000, 512))
     start = time.perf_counter()
     for _ in range(4):
         for chosen in actions:
@@ -112,13 +103,16 @@ MEASUREMENTS: list[tuple[str, str, Callable[..., str], tuple, dict]] = [
 ]
 
 
-def main() -> None:
-    """Measure all of it, and print tables."""
-    shown = Table("what", "bar", "measured")
+def measured() -> Iterator[tuple[str, ...]]:
+    """Each in a process of its own."""
     for name, bar, measure, arguments, settings in MEASUREMENTS:
         with multiprocessing.get_context("spawn").Pool(1) as pool:
-            shown.add_row(name, bar, pool.apply(measure, arguments, settings))
-    Console(width=150).print(shown)
+            yield name, bar, pool.apply(measure, arguments, settings)
+
+
+def main() -> None:
+    """Measure all of it, and print a table."""
+    print_table("speed and memory", ("what", "bar", "measured"), measured())
 
 
 if __name__ == "__main__":

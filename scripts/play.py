@@ -1,7 +1,6 @@
 """Play an environment with the keyboard; your episodes become a Minari dataset to learn from.
 
 For example:
-    python scripts/play.py
     python scripts/play.py --env-id Taxi-v4 --episodes 3 --dataset-id me/taxi-v0 --root data
     python scripts/play.py --env-id CartPole-v1 --mode window
     echo ddsssd | python scripts/play.py --env-kwargs is_slippery=false --episodes 1 --root data
@@ -14,6 +13,7 @@ import signal
 import sys
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Annotated
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
 
@@ -24,7 +24,7 @@ from irl_gym.experiment import parse_keywords
 from irl_gym.keyboard import controls_of
 from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
 from irl_gym.screens import as_text, draw, terminal_keys, window_keys
-from irl_gym.terminal import print_error
+from irl_gym.terminal import OPTIONS, UNSET, print_error
 
 ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 """Ctrl-C, a kill, a terminal that is closed: nothing that was finished is lost."""
@@ -36,13 +36,13 @@ class Arguments:
 
     env_id: str = "FrozenLake-v1"
     """A registered environment with Discrete actions; module:id for one of another package."""
-    env_kwargs: tuple[str, ...] = ()
+    env_kwargs: Annotated[tuple[str, ...], UNSET] = ()
     """What the environment is made with: name=value ..., or one json object."""
     episodes: int = 5
     """Episodes to finish; q ends sooner."""
-    dataset_id: str | None = None
+    dataset_id: Annotated[str | None, UNSET] = None
     """namespace/name-v0; the default is named after the environment, in its first free version."""
-    root: str | None = None
+    root: Annotated[str | None, UNSET] = None
     """Minari's root folder; the default is Minari's own."""
     mode: Mode = "terminal"
     """Show it in the terminal, or in a window."""
@@ -116,4 +116,4 @@ def main(asked: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))

@@ -14,9 +14,9 @@ import tyro
 from rich.console import Console
 
 from irl_gym import IrlGymError, recover_and_retrain
-from irl_gym.arguments import OPTIONS, Arguments
+from irl_gym.arguments import Arguments
 from irl_gym.report import print_report
-from irl_gym.terminal import print_error, stage_bars
+from irl_gym.terminal import OPTIONS, print_error, stage_bars
 
 
 def main(arguments: Arguments, command: Sequence[str]) -> int:

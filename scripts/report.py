@@ -14,10 +14,9 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
-from irl_gym.arguments import OPTIONS, UNSET
 from irl_gym.page.report import write_report
 from irl_gym.runs import read_run, understood
-from irl_gym.terminal import check_writable, print_error
+from irl_gym.terminal import OPTIONS, UNSET, check_writable, print_error
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ For example:
 """
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -16,29 +15,18 @@ import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 from scipy.stats import rankdata
 
 from irl_gym import distances as known
 from irl_gym.checks import checked_number
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.gridworlds import gridworld, gridworld_rewards
-from irl_gym.distances.random_rewards import random_mdp, random_reward, redistributed, shaped
-from irl_gym.dynamic_programming import policy_iteration
-from irl_gym.metrics import policy_value
+from irl_gym.distances.random_rewards import random_mdp, random_reward, redistributed, relative_regret, shaped
+from irl_gym.distances.variants import VARIANTS as DISTANCES
+from irl_gym.terminal import print_table
 
 Measured = Literal["figure", "invariance", "regret", "bound"]
 CONSOLE = Console(width=120)
-DISTANCES = {
-    "STARC, VAL": known.STARC(),
-    "STARC, minimal norm": known.STARC(known.MinimalNorm()),
-    "STARC, VAL, L1": known.STARC(norm=1, metric=1),
-    "STARC, VAL, L infinity": known.STARC(norm=np.inf, metric=np.inf),
-    "EPIC": known.EPIC(),
-    "DARD": known.DARD(),
-    "Spearman": known.Spearman(),
-    "raw Pearson": known.Pearson(known.AsGiven()),
-}
 
 
 @dataclass(frozen=True)
@@ -59,20 +47,13 @@ class Arguments:
             checked_number(name, getattr(self, name), f"a whole number of at least {least}", least=least, whole=True)
 
 
-def show(title: str, columns: Iterable[str], names: Iterable[str], cells: Iterable[Iterable[str]]) -> None:
-    """Print a table; each row has a name."""
-    table = Table(*columns, title=title)
-    for name, row in zip(names, cells, strict=True):
-        table.add_row(name, *row)
-    CONSOLE.print(table)
-
-
 def figure(_: Arguments) -> bool:
     """The distances of EPIC's gridworlds."""
     rewards = gridworld_rewards()
     found = {name: known.distance_matrix(DISTANCES[name], gridworld(), rewards) for name in ("EPIC", "DARD", "STARC, VAL")}
     for name, matrix in found.items():
-        show(f"3x3 gridworlds, {name}", (name, *rewards), rewards, ([f"{x:.4f}" for x in row] for row in matrix))
+        rows = ([other, *(f"{x:.4f}" for x in row)] for other, row in zip(rewards, matrix, strict=True))
+        print_table(f"3x3 gridworlds, {name}", (name, *rewards), rows)
     return bool(np.allclose(found["EPIC"][0, [1, 2, 4]], (0.0, 0.75, 0.1602), rtol=0, atol=5e-5))  # Dense, Center, Path
 
 
@@ -87,9 +68,9 @@ def invariance(given: Arguments) -> bool:
         others = [7 * rng.random() * R, shaped(rng, mdp, R), moved, 3 * shaped(rng, mdp, moved)]
         for name, distance in DISTANCES.items():
             found[name][i] = known.distance_matrix(distance, mdp, [R, *others])[0, 1:]
-    cells = ([f"{x.max():.1e} ({x.min():.1e})" for x in values.T] for values in found.values())
+    rows = ([name, *(f"{x.max():.1e} ({x.min():.1e})" for x in values.T)] for name, values in found.items())
     columns = ("distance", "scaling", "shaping", "S'-redistribution", "all three")
-    show(f"from R to an equivalent reward, {mdps} random MDPs: largest (smallest)", columns, found, cells)
+    print_table(f"from R to an equivalent reward, {mdps} random MDPs: largest (smallest)", columns, rows)
     return max(found[name].max() for name in list(DISTANCES)[:4]) < 1e-8 and found["EPIC"][:, 2].min() > 1e-8
 
 
@@ -101,11 +82,10 @@ def regret(given: Arguments) -> bool:
         mdp = random_mdp(rng)
         first, end = random_reward(rng, mdp), random_reward(rng, mdp)
         second = first + (end - first) * rng.integers(1, 17) / 16
-        R, other = ((mdp.P.toarray().reshape(one.shape) * one).sum(axis=2) for one in (first, second))
-        best, worst, got = (policy_value(mdp, R, policy_iteration(mdp, one).policy) for one in (R, -R, other))
-        found[i] = [(best - got) / (best - worst), *(d.distance(mdp, first, second) for d in DISTANCES.values())]
+        found[i] = [relative_regret(mdp, first, second), *(d.distance(mdp, first, second) for d in DISTANCES.values())]
     rho = dict(zip(DISTANCES, np.corrcoef(rankdata(found, axis=0).T)[0, 1:], strict=True))
-    show(f"regret in {pairs} random MDPs", ("distance", "rank correlation"), rho, ([f"{x:.3f}"] for x in rho.values()))
+    rows = ((name, f"{x:.3f}") for name, x in rho.items())
+    print_table(f"regret in {pairs} random MDPs", ("distance", "rank correlation"), rows)
     return bool(rho["STARC, VAL"] > rho["EPIC"])
 
 
@@ -117,8 +97,9 @@ def bound(given: Arguments) -> bool:
         R, other = rng.normal(size=(2, mdp.n_states, mdp.n_actions, mdp.n_states))
         found.append(epic_bound(mdp, R, R + rng.choice([0.1, 1.0, 10.0]) * other))
     share = np.array([(b.regret / b.bound, b.regret / b.sharper) for b in found])
-    cells, columns = ([f"{(x > 1).sum()}", f"{x.max():.2g}"] for x in share.T), ("theorem 4.9", "violated", "regret / bound")
-    show(f"EPIC's bound, {given.mdps} random MDPs", columns, ("16 K |R|", "4 K |C(R) - mean|"), cells)
+    names = ("16 K |R|", "4 K |C(R) - mean|")
+    rows = ((name, f"{(x > 1).sum()}", f"{x.max():.2g}") for name, x in zip(names, share.T, strict=True))
+    print_table(f"EPIC's bound, {given.mdps} random MDPs", ("theorem 4.9", "violated", "regret / bound"), rows)
     return bool((share <= 1).all())
 
 

@@ -6,7 +6,9 @@ Rewards are (S, A, S). Axes: S states, A actions.
 import numpy as np
 from scipy.special import softmax
 
+from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.mdp import TabularMDP
+from irl_gym.metrics import policy_value
 
 
 def random_mdp(rng: np.random.Generator, S: int = 32, A: int = 4, gamma: float = 0.95) -> TabularMDP:
@@ -40,3 +42,10 @@ def redistributed(rng: np.random.Generator, mdp: TabularMDP, R: np.ndarray) -> n
     """R with payments moved among the successors of each (s, a), their mean kept, and others on impossible transitions."""
     moved = rng.normal(size=R.shape)
     return R + moved - (mdp.P.toarray().reshape(R.shape) * moved).sum(axis=2, keepdims=True)
+
+
+def relative_regret(mdp: TabularMDP, first: np.ndarray, second: np.ndarray) -> float:
+    """What a policy that is best under the second reward loses under the first, over the range of values: from 0 to 1."""
+    R, other = ((mdp.P.toarray().reshape(one.shape) * one).sum(axis=2) for one in (first, second))
+    best, worst, got = (policy_value(mdp, R, policy_iteration(mdp, one).policy) for one in (R, -R, other))
+    return (best - got) / (best - worst)

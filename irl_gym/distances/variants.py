@@ -1,0 +1,19 @@
+"""Distances by the names that tables of them give: every one that a paper recommends, and raw values beside them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from irl_gym.distances.canonical import AsGiven, MinimalNorm
+from irl_gym.distances.exact import DARD, EPIC, STARC, Pearson, RewardDistance, Spearman
+
+VARIANTS: Mapping[str, RewardDistance] = {
+    "STARC, VAL": STARC(),
+    "STARC, minimal norm": STARC(MinimalNorm()),
+    "STARC, VAL, L1": STARC(norm=1, metric=1),
+    "STARC, VAL, L infinity": STARC(norm=np.inf, metric=np.inf),
+    "EPIC": EPIC(),
+    "DARD": DARD(),
+    "Spearman": Spearman(),
+    "raw Pearson": Pearson(AsGiven()),
+}

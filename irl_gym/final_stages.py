@@ -20,6 +20,7 @@ from irl_gym.errors import IrlGymError
 from irl_gym.figures import layout_of
 from irl_gym.filming import film
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.mdp import TabularMDP
 from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
 from irl_gym.run_folder import write_json
@@ -70,9 +71,10 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
     if why is not None:
         return told | {"no_ambiguity": why}
     arrays = {}
+    assert isinstance(loop.world, TableWorld)  # or there is too much
     for name, examine in (("widths", _widths), ("path", _path)):
         try:
-            arrays |= {f"{name}.{key}": value for key, value in examine(loop).items()}
+            arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
     np.savez(folder / "ambiguity.npz", **arrays)
@@ -105,19 +107,18 @@ def _too_much(loop: "Loop") -> str | None:
     return None
 
 
-def _widths(loop: "Loop") -> dict[str, np.ndarray]:
+def _widths(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
     """How far apart the rewards of one state can be, or of one step."""
     learner: Any = loop.experiment.learner
-    mdp = loop.world.table.mdp  # type: ignore[union-attr]
     found = feasible_widths(mdp, loop.known_expert, r_max=learner.r_max, reward_on=learner.reward_on)
     return {"low": found.low, "high": found.high, "width": found.width}
 
 
-def _path(loop: "Loop") -> dict[str, np.ndarray]:
+def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
     """How the reward changes with lambda, with the cap on margins that the run's own program had."""
     learner: Any = loop.experiment.learner
     found = lambda_path(
-        loop.world.table.mdp,  # type: ignore[union-attr]
+        mdp,
         loop.known_expert,
         r_max=learner.r_max,
         margin_cap=loop.certificate["margin_cap"],

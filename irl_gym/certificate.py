@@ -243,7 +243,7 @@ def judged(
         r_max: bound on |R|.
         visits: (S,) how often each state was visited; None when that is not known.
     """
-    rounding, worst = tolerated(R, mdp.gamma), float(violations.max(initial=0.0))
+    rounding, worst = tolerated(R.largest(part), mdp.gamma), float(violations.max(initial=0.0))
     paid = R.values if R.on_states else R.values[~part.terminal]
     tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
     margin = np.full(mdp.n_states, np.nan)
@@ -261,9 +261,9 @@ def judged(
     }
 
 
-def tolerated(R: TabularReward, gamma: float) -> float:
-    """The violation of (4) that is none: what solvers' feasibility leaves."""
-    return OPTIMAL_WITHIN * float(np.abs(R.values).max()) * (1 + 0.1 / (1 - gamma))
+def tolerated(largest: float, gamma: float) -> float:
+    """The violation of (4) that is none, for rewards up to the largest: what solvers' feasibility leaves."""
+    return OPTIMAL_WITHIN * largest * (1 + 0.1 / (1 - gamma))
 
 
 def violated_rows(

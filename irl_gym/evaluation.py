@@ -74,7 +74,7 @@ def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
     """What a score is measured by; earned are the discounted returns (N,) of episodes that were given."""
     world, rounding = loop.world, 0.0
     if isinstance(world, TableWorld):
-        rounding = metrics.TIE_TOLERANCE * float(np.abs(world.table.reward.values).max())
+        rounding = metrics.tie_tolerance(world.table.mdp, world.table.reward)
     random = world.value(world.random)
     if not from_data(loop):
         return Scale(random, world.value(loop.expert), rounding, gamma=world.gamma)
@@ -146,7 +146,7 @@ def good_actions(mdp: TabularMDP, true: TabularReward, expert: np.ndarray | None
         expert: (S,) actions or (S, A) probabilities; None where it errs or is known by data, and optimal actions count.
         Q: (S, A) optimal values under the true reward.
     """
-    tolerance = metrics.TIE_TOLERANCE * float(np.abs(true.values).max())
+    tolerance = metrics.tie_tolerance(mdp, true)
     if expert is None or metrics.policy_value(mdp, true, expert) >= float(mdp.d0 @ Q.max(axis=1)) - tolerance:
         return tied(Q, tolerance)
     return support(expert, mdp.n_states, mdp.n_actions)

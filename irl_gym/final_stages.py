@@ -23,6 +23,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
+from irl_gym.page.slider import MOST_PIECES
 from irl_gym.run_folder import write_json
 from irl_gym.runs import read_run
 from irl_gym.worlds import TableWorld
@@ -31,12 +32,10 @@ if TYPE_CHECKING:
     from irl_gym.loop import Loop
 
 FILMS = ("expert", "agent")
-MOST_STATES = 150
-"""Reachable states of a table whose feasible set is examined."""
-MOST_UNKNOWNS = 400
-"""Rewards that are asked about: states, or states and actions; two programs each."""
-MOST_PIECES = 60
-"""Of the lambda path."""
+MOST_STATES = 500
+"""States to act in, of a table whose feasible set is examined."""
+MOST_STEPS = 2_500
+"""Rewards of steps that are asked about; two programs each."""
 
 
 def record(loop: "Loop", folder: Path) -> dict[str, Any]:
@@ -100,10 +99,12 @@ def _too_much(loop: "Loop") -> str | None:
     if not isinstance(learner, FiniteLP) or not isinstance(world, TableWorld):
         return f"the learner is {type(learner).__name__}: only FiniteLP's reward is examined"
     mdp = world.table.mdp
-    n = int(mdp.reachable.sum())
-    unknowns = n * (mdp.n_actions if learner.reward_on == "state-action" else 1)
-    if n > MOST_STATES or unknowns > MOST_UNKNOWNS:
-        return f"{n} states and {unknowns} rewards: at most {MOST_STATES} and {MOST_UNKNOWNS} are examined"
+    n = int((mdp.reachable & ~mdp.terminal).sum())
+    steps = n * mdp.n_actions if learner.reward_on == "state-action" else 0
+    if n > MOST_STATES:
+        return f"there are {n:,} states to act in: it is worked out for at most {MOST_STATES}"
+    if steps > MOST_STEPS:
+        return f"there are {steps:,} states and actions: it is worked out for at most {MOST_STEPS:,}"
     return None
 
 
@@ -126,6 +127,7 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
         most_pieces=MOST_PIECES,
     )
     arrays = {name: getattr(found, name) for name in ("breakpoints", "rewards", "margins", "l1_norms", "total_margins")}
+    arrays |= {"gap": np.array(found.gap), "exact": np.array(found.exact)}
     return arrays | {"changes": np.array(json.dumps([change.to_json() for change in found.changes]))}
 
 

@@ -77,8 +77,13 @@ def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:
     return policy_value(mdp, reward, uniform)
 
 
+def tie_tolerance(mdp: TabularMDP, reward: TabularReward | np.ndarray, share: float = TIE_TOLERANCE) -> float:
+    """What counts as tied, in units of value: a share of the largest |R| that can be paid."""
+    return share * as_reward(reward).largest(mdp)
+
+
 def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE) -> ActionSets:
-    """(S, A) the actions that are optimal, to a tolerance in units of max |R|.
+    """(S, A) the actions that are optimal, to a tolerance in units of the largest |R| that can be paid.
 
     Raises:
         InvalidMDP, InvalidReward: no table, or a reward of another.
@@ -86,7 +91,7 @@ def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tole
     """
     tolerance = checked_number("tolerance", tolerance, "a share of max |R| of at least 0, such as 1e-6", least=0)
     reward = as_reward(reward)
-    return tied(policy_iteration(checked_mdp(mdp), reward).Q, tolerance * float(np.abs(reward.values).max()))
+    return tied(policy_iteration(checked_mdp(mdp), reward).Q, tie_tolerance(mdp, reward, tolerance))
 
 
 def worst_tie(

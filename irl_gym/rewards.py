@@ -101,6 +101,15 @@ class TabularReward:
             return (table.P @ self.values).reshape(shape)
         return np.where(table.terminal[:, None], 0.0, self.values)
 
+    def largest(self, table: TransitionTable) -> float:
+        """The largest |R| that can be paid: of states that are reached, or of steps that are taken in them.
+
+        Tolerances are shares of it: a number in a row that no episode reads must not widen them.
+        """
+        self.expected(table)  # checks the shape
+        read = table.reachable if self.on_states else table.reachable & ~table.terminal
+        return float(np.abs(self.values[read]).max(initial=0.0))
+
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
         write_archive(path, {"format": FORMAT, "note": dict(self.note)}, {"values": self.values})

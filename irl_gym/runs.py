@@ -69,7 +69,8 @@ class Run:
     widths: Mapping[str, np.ndarray] | None
     """low, high, width: (S,) how far the reward of a state is left open; NaN where it is never reached."""
     lambda_path: Mapping[str, Any] | None
-    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list)."""
+    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
+    exact, whether these are all pieces, and gap, what others can be worth."""
 
     @property
     def tabular(self) -> TabularReward | None:

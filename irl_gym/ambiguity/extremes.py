@@ -16,7 +16,7 @@ from irl_gym._typing import Sparse
 from irl_gym.checks import checked_number
 from irl_gym.warm_lp import WarmLP
 
-CHUNK = 50
+CHUNK = 100
 """Functions solved one after the other from one start."""
 
 
@@ -35,9 +35,9 @@ class Polytope:
     most: np.ndarray
     """(n,) largest values of the unknowns."""
 
-    def program(self, time_limit: float | None = None) -> WarmLP:
+    def program(self, time_limit: float | None = None, *, perturbed: bool = True) -> WarmLP:
         """The linear program whose objective may change."""
-        return WarmLP(self.A, self.low, self.high, self.least, self.most, time_limit=time_limit)
+        return WarmLP(self.A, self.low, self.high, self.least, self.most, time_limit=time_limit, perturbed=perturbed)
 
 
 def extremes(

@@ -145,7 +145,7 @@ def membership(
     reward.expected(mdp)  # checks the shape
     part, R = posed.part, TabularReward(reward.values[posed.rows])
     if tolerance is None:
-        tolerance = tolerated(R, part.gamma)
+        tolerance = tolerated(R.largest(part), part.gamma)
     tolerance = checked_number("tolerance", tolerance, "a number of at least 0, in units of value, or None", least=0)
     posed = _acting_best(posed, R)
     c = posed.comparisons

@@ -1,27 +1,23 @@
 """FiniteLP's program as a function of lambda, the price of ||R||_1: one linear program whose objective changes.
 
-    maximise    sum_s t(s) - lambda sum(R+ + R-)
-    subject to  (I - gamma P_pi) V = R+ - R-   (5),  or V = R_pi + gamma P_pi V for R(s, a);   0 <= R+, R- <= R_max
-                margins >= t(s) in the rows that count, >= 0 in the others, = 0 where the expert takes the action too  (4)
-                0 <= t (<= cap)
+    maximise    sum_s t(s) - lambda ||R||_1    subject to what `PricedRewards` says, with 0 <= t (<= cap)
 Solved warm by `WarmLP`, in a hundredth of R_max or of the cap, the smaller. What is handed out is recomputed from R alone: the
 margins by `row_margins`, and Lagrange's bound above the optimum from the program's duals.
-Axes: S states, A actions, n rows of (4), m states with a margin, q rewards (S or S*A), x all unknowns: V, t, R+, R-.
+Axes: S states, A actions, n rows of (4), q rewards (S or S*A).
 """
 
 import time
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from irl_gym.ambiguity.envelope import Line
+from irl_gym.ambiguity.priced_rewards import PricedRewards
 from irl_gym.certificate import least_per_state, row_margins
 from irl_gym.comparisons import compare
 from irl_gym.dual_bound import DualBound
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import SolverFailed, SolverTimeout
-from irl_gym.learners.programs import picking
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.warm_lp import Vertex, WarmLP
@@ -59,39 +55,18 @@ class PricedProgram:
         trivial = c.trivial & ~c.equal if on_states else np.zeros(c.states.size, dtype=bool)
         self.usable = ~c.equal & ~trivial
         self.counted = self.usable & ~np.isin(c.states, c.states[trivial]) if cap is None else self.usable
-        self.states = np.unique(c.states[self.counted])
         self.discounted = Discounted(part.P_pi(c.distribution), part.gamma)
         self.unit = (r_max if cap is None else min(r_max, cap)) / LARGE
-        self.size = part.n_states * (1 if on_states else part.n_actions)
-        self.kept = np.flatnonzero(~c.trivial) if on_states else np.arange(c.states.size)
+        self.program = PricedRewards(part, c, on_states=on_states, counted=self.counted)
+        self.states = self.program.states
         self.largest = 0.0
         """The largest total margin seen."""
         self.lp = self._program()
 
     def _program(self, *, perturbed: bool = False) -> WarmLP:
-        """The constraints."""
-        part, c, kept = self.part, self.comparisons, self.kept
-        S, A, m, q = part.n_states, part.n_actions, self.states.size, self.size
-        closing = sp.eye_array(S) - part.gamma * part.P_pi(c.distribution)
-        pays = sp.eye_array(S) if self.on_states else part.mixing(c.distribution)  # (S, q) R of the expert's step
-        states, counted = c.states[kept], self.counted[kept]
-        at = np.searchsorted(self.states, states[counted])
-        t = sp.csr_array((np.ones(at.size), (np.flatnonzero(counted), at)), shape=(kept.size, m))
-        if self.on_states:
-            gain, step = c.rows[kept], sp.csr_array((kept.size, q))
-        else:
-            stacked = states * A + c.actions[kept]
-            gain = picking(states, S) - part.gamma * part.P[stacked]
-            step = picking(stacked, q)
-        A_all = sp.csr_array(sp.block_array([[closing, sp.csr_array((S, m)), -pays, pays], [gain, -t, -step, step]]))
-        bound = np.full(q, self.r_max / self.unit)
-        if not self.on_states:
-            bound[np.repeat(part.terminal, A)] = 0.0
-        most_t = np.full(m, np.inf if self.cap is None else self.cap / self.unit)
-        least = np.concatenate([np.full(S, -np.inf), np.zeros(m + 2 * q)])
-        most = np.concatenate([np.full(S, np.inf), most_t, bound, bound])
-        high = np.concatenate([np.zeros(S), np.where(c.equal[kept], 0.0, np.inf)])
-        return WarmLP(A_all, np.zeros(S + kept.size), high, least, most, perturbed=perturbed)
+        """The constraints, in the program's unit."""
+        most = np.inf if self.cap is None else self.cap / self.unit
+        return self.program.polytope(self.r_max / self.unit, 0.0, most).program(perturbed=perturbed)
 
     def at(self, price: float) -> tuple[Line, float]:
         """An optimal reward at a price, and Lagrange's bound above the optimum.
@@ -105,8 +80,7 @@ class PricedProgram:
             if left <= 0:
                 raise self._late()
             self.lp.time_limit = left
-        S, m, q = self.part.n_states, self.states.size, self.size
-        cost = PRICED * np.concatenate([np.zeros(S), -np.ones(m), np.full(2 * q, price)])
+        cost = PRICED * self.program.cost(1.0, price)
         line, bound, off = self._answer(self._solved(cost), price)
         if off > ACCURATE:  # once more, from nothing: the simplex method says "optimal" of a basis that has become inexact
             again = self._answer(self._afresh(cost), price)
@@ -116,10 +90,9 @@ class PricedProgram:
 
     def _answer(self, vertex: Vertex, price: float) -> tuple[Line, float, float]:
         """The reward of a vertex, the bound of its duals, and how far from an optimum of the program these are."""
-        S, m, q = self.part.n_states, self.states.size, self.size
-        line, violation = self.line(vertex.x[S + m : S + m + q] - vertex.x[S + m + q :])
+        line, violation = self.line(self.program.rewards(vertex.x))
         y = np.zeros(self.comparisons.states.size)
-        y[self.kept] = vertex.row_duals[S:] / PRICED
+        y[self.program.kept] = vertex.row_duals[self.part.n_states :] / PRICED
         bound = self.bound(y, price)
         missing = (bound - line.at(price)) / max(self.largest, line.total, 1e-300)
         return line, bound, max(missing, violation / (self.unit * LARGE))

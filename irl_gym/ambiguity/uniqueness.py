@@ -7,26 +7,23 @@ and bound that has a price where it is, and every feasible point that keeps them
 is left is the face. A price below `tolerance` is none, so all rewards counted as optimal are within tolerance, times what the
 rows and bounds leave, of the optimum. Then R(s) is made least and largest over the face.
 
-    unknowns     states: V (S,), R = (I - gamma P_pi) V;      steps: V (S,) and R (S, A), each R(s, a) = V(s) - gamma P_sa V
-                 for actions that the expert takes
-                 t (m,), R+ >= R, 0: as in `learners.programs`
-Axes: S states, A actions, n rows of (4), m states with a margin.
+The unknowns and constraints are those of `PricedRewards`, in units of R_max. Axes: S states, A actions, n rows of (4).
 """
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from irl_gym._typing import Indices, Sparse
+from irl_gym._typing import Indices
 from irl_gym.ambiguity.extremes import Polytope, extremes
 from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
+from irl_gym.ambiguity.priced_rewards import PricedRewards
 from irl_gym.ambiguity.widths import served_states
 from irl_gym.checks import checked_number
 from irl_gym.errors import DegenerateExpert, InvalidParameter
 from irl_gym.learners.finite import FiniteLP
-from irl_gym.learners.programs import JUST_BELOW, RewardOn, picking
+from irl_gym.learners.programs import JUST_BELOW
 from irl_gym.mdp import TabularMDP
 from irl_gym.warm_lp import Vertex
 
@@ -125,16 +122,17 @@ def optimal_face(
         )
     l1, cap, counted = _settled(mdp, expert, learner, posed)
     sparsest = learner.margin_cap == "auto" and l1 == 0
-    r_max = learner.r_max
-    program = _Priced(posed, learner.reward_on, counted)
-    if sparsest:
-        polytope, cost = program.sparsest(cap / r_max if cap else 0.0)
-    else:
-        polytope, cost = program.best(l1, None if cap is None else cap / r_max)
-    vertex = polytope.program(learner.time_limit).minimise(cost)
+    r_max, top = learner.r_max, np.inf if cap is None else cap / learner.r_max
+    program = PricedRewards(posed.part, posed.comparisons, on_states=learner.reward_on == "state", counted=counted)
+    polytope = program.polytope(1.0, top if sparsest else 0.0, top)
+    vertex = polytope.program(learner.time_limit).minimise(program.cost(0.0, 1.0) if sparsest else program.cost(1.0, l1))
+    asked = np.flatnonzero(polytope.most[-program.size :] > 0)  # no step is taken in a terminal state
     face = _kept(polytope, vertex, tolerance)
-    least, most = extremes(face, program.rewards(), workers=workers, time_limit=learner.time_limit)
-    low, high = (over_all_states(posed, mdp, program.shaped(values) * r_max) for values in (least, np.maximum(least, most)))
+    least, most = extremes(face, program.picked[asked], workers=workers, time_limit=learner.time_limit)
+    low, high = (np.full(program.size, np.nan) for _ in range(2))
+    low[asked], high[asked] = r_max * least, r_max * np.maximum(least, most)
+    shape = (-1,) if program.on_states else (-1, mdp.n_actions)
+    low, high = (over_all_states(posed, mdp, values.reshape(shape)) for values in (low, high))
     objective = r_max * (vertex.objective if sparsest else -vertex.objective)
     return Face(low, high, objective, sparsest, r_max, l1, cap)
 
@@ -153,81 +151,6 @@ def _settled(mdp: TabularMDP, expert: Any, learner: FiniteLP, posed: Posed) -> t
         served, cap = served_states(learner, mdp, expert)
         counted = counted & np.isin(posed.rows, served)[c.states]
     return l1, cap, counted
-
-
-class _Priced:
-    """The programs in units of R_max. The unknowns by block: V, R of steps, t, R+."""
-
-    def __init__(self, posed: Posed, on: RewardOn, counted: np.ndarray):
-        part, c = posed.part, posed.comparisons
-        S, A = part.n_states, part.n_actions
-        self.on_states, self.shape = on == "state", (S,) if on == "state" else (S, A)
-        self.ended = np.repeat(part.terminal, A)
-        self.counted, self.equal, self.taken = counted, c.equal, posed.taken.ravel()
-        self.position = np.unique(c.states[counted], return_inverse=True)[1]
-        self.n_margins = int(self.position.max()) + 1
-        self.largest_value = 1 / (1 - part.gamma)
-        if self.on_states:
-            self.R: Sparse = sp.csr_array(sp.eye_array(S) - part.gamma * part.P_pi(c.distribution))
-            self.margins: Sparse = c.rows
-            self.ties: Sparse = sp.csr_array((0, S))
-        else:
-            pairs = np.arange(S * A)
-            worth = picking(pairs // A, S) - part.gamma * part.P
-            losing = sp.csr_array(sp.hstack([worth, -sp.eye_array(S * A)]))  # zeta of each pair
-            self.R = sp.csr_array(sp.hstack([sp.csr_array((S * A, S)), sp.eye_array(S * A)]))
-            self.margins = losing[c.states * A + c.actions]
-            self.ties = losing[np.flatnonzero(self.taken)]
-        self.columns = self.R.shape[1]
-        self.value = np.full(self.columns, self.largest_value)
-        if not self.on_states:
-            self.value = np.concatenate([np.where(part.terminal, 0.0, self.largest_value), np.where(self.ended, 0.0, 1.0)])
-
-    def rewards(self) -> Sparse:
-        """(k, n) R as functions of the unknowns; of steps where one is taken."""
-        chosen = self.R if self.on_states else self.R[np.flatnonzero(~self.ended)]
-        return sp.csr_array(sp.hstack([chosen, sp.csr_array((chosen.shape[0], self.unknowns - self.columns))]))
-
-    def shaped(self, values: np.ndarray) -> np.ndarray:
-        """(S,) or (S, A)."""
-        if self.on_states:
-            return values
-        found = np.full(self.ended.size, np.nan)
-        found[~self.ended] = values
-        return found.reshape(self.shape)
-
-    def best(self, l1: float, cap: float | None) -> tuple[Polytope, np.ndarray]:
-        """Maximise sum(t) - l1 ||R||_1, 0 <= t (<= cap)."""
-        return self._program(0.0, l1, gains=True, cap=cap)
-
-    def sparsest(self, margin: float) -> tuple[Polytope, np.ndarray]:
-        """Minimise ||R||_1 with margins of at least `margin`."""
-        return self._program(margin, 1.0, gains=False, cap=None)
-
-    def _program(self, margin: float, l1: float, *, gains: bool, cap: float | None) -> tuple[Polytope, np.ndarray]:
-        k, n = self.R.shape[0], self.counted.size
-        m, p = self.n_margins if gains else 0, k if l1 > 0 else 0
-        self.unknowns = self.columns + m + p
-        less = sp.lil_array((n, m))
-        if gains:
-            less[np.flatnonzero(self.counted), self.position] = -1.0
-        blocks: list[list[Any]] = [
-            [self.R, sp.csr_array((k, m)), sp.csr_array((k, p))],
-            [self.margins, less, sp.csr_array((n, p))],
-            [self.ties, sp.csr_array((self.ties.shape[0], m)), sp.csr_array((self.ties.shape[0], p))],
-            [-self.R[:p], sp.csr_array((p, m)), sp.eye_array(p)],
-        ]
-        A = sp.csr_array(sp.vstack([sp.hstack(row) for row in blocks]))
-        tied = np.zeros(self.ties.shape[0])
-        polytope = Polytope(
-            A,
-            np.concatenate([np.full(k, -1.0), np.where(self.counted, margin, 0.0), tied, np.zeros(p)]),
-            np.concatenate([np.ones(k), np.where(self.equal, 0.0, np.inf), tied, np.full(p, np.inf)]),
-            np.concatenate([-self.value, np.zeros(m + p)]),
-            np.concatenate([self.value, np.full(m, np.inf if cap is None else cap), np.ones(p)]),
-        )
-        cost = np.concatenate([-l1 * np.asarray(self.R.sum(axis=0)).ravel(), np.full(m, -1.0), np.full(p, 2 * l1)])
-        return polytope, cost
 
 
 def _kept(polytope: Polytope, vertex: Vertex, tolerance: float) -> Polytope:

@@ -21,7 +21,7 @@ from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import TIE_TOLERANCE
+from irl_gym.metrics import TIE_TOLERANCE, tie_tolerance
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 
@@ -133,21 +133,26 @@ class Case:
 
     @cached_property
     def scale(self) -> float:
-        """The largest |R| of a reachable state."""
-        return 0.0 if self.reward is None else float(np.abs(self.reward.values[self.states]).max(initial=0.0))
+        """The largest |R| that can be paid."""
+        return 0.0 if self.reward is None or self.mdp is None else self.reward.largest(self.mdp)
 
     @cached_property
     def tolerance(self) -> float:
         """A margin or a violation below this is the solvers' rounding."""
         if self.mdp is None or self.reward is None:
             return 0.0
-        return tolerated(TabularReward(self.reward.values[self.states]), self.mdp.gamma)
+        return tolerated(self.scale, self.mdp.gamma)
 
     @cached_property
     def ties(self) -> ActionSets:
         """(S, A) actions that are greedy under R. Ask only where there is a reward in a table."""
         assert self.optimum is not None
         return tied(self.optimum.Q, TIE_TOLERANCE * self.scale)
+
+    @cached_property
+    def true_tie(self) -> float:
+        """Differences up to this are none, in values under the true reward; 0 where it is not known."""
+        return 0.0 if self.mdp is None or self.true is None else tie_tolerance(self.mdp, self.true)
 
     @cached_property
     def rows(self) -> Rows | None:

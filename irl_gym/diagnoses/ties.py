@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from irl_gym._typing import Indices
 from irl_gym.diagnoses.case import Case, Rows
 from irl_gym.diagnoses.findings import Finding, counted, named
 from irl_gym.errors import DegenerateExpert
-from irl_gym.metrics import TIE_TOLERANCE
 
 
 def violated(case: Case) -> Finding | None:
@@ -17,16 +17,17 @@ def violated(case: Case) -> Finding | None:
     if not which.size:
         return None
     which = which[np.argsort(-rows.violations[which], kind="stable")]
+    worst = float(rows.violations[which[0]])
+    more = f"in {{states}} another action is worth more, by at most {worst:.3g}: {{where}}"
+    told = f"The expert is not optimal under this reward: {more}."
+    return _found("expert-not-optimal", told, _obey(case), rows, which)
+
+
+def _found(name: str, told: str, mend: str, rows: Rows, which: np.ndarray) -> Finding:
+    """A finding about some rows (k,); its sentence has {states}, how many there are, and {where}, the first of them."""
     states, actions = rows.states[which], rows.actions[which]
-    count, worst = np.unique(states).size, float(rows.violations[which[0]])
-    where = f"in {counted(count)} another action is worth more, by at most {worst:.3g}: {named(states, actions)}"
-    return Finding(
-        "expert-not-optimal",
-        f"The expert is not optimal under this reward: {where}.",
-        _obey(case),
-        states,
-        tuple(actions.tolist()),
-    )
+    sentence = told.format(states=counted(np.unique(states).size), where=named(states, actions))
+    return Finding(name, sentence, mend, states, tuple(actions.tolist()))
 
 
 def _obey(case: Case) -> str:
@@ -55,22 +56,17 @@ def same_successors(case: Case) -> Finding | None:
         return None
     tied = rows.trivial & ~rows.equal
     if case.true_optimum is not None and case.true is not None:
-        Q, scale = case.true_optimum.Q, float(np.abs(case.true.values).max())
+        Q = case.true_optimum.Q
         theirs = (case.distribution * Q).sum(axis=1)
-        tied &= theirs[rows.states] - Q[rows.states, rows.actions] > TIE_TOLERANCE * scale
+        tied &= theirs[rows.states] - Q[rows.states, rows.actions] > case.true_tie
     which = np.flatnonzero(tied)
     if not which.size:
         return None
-    states, actions = rows.states[which], rows.actions[which]
     harm = "but not the same true reward" if case.true is not None else "which does no harm only if they also cost the same"
-    return Finding(
-        "same-successors",
-        f"In {counted(np.unique(states).size)} an action leads where the expert's own leads, {harm}: {named(states, actions)}. "
-        "No reward on states tells them apart.",
-        'reward_on="state-action".',
-        states,
-        tuple(actions.tolist()),
+    told = (
+        f"In {{states}} an action leads where the expert's own leads, {harm}: {{where}}. No reward on states tells them apart."
     )
+    return _found("same-successors", told, 'reward_on="state-action".', rows, which)
 
 
 def _marginless(case: Case, rows: Rows) -> np.ndarray:
@@ -81,57 +77,42 @@ def _marginless(case: Case, rows: Rows) -> np.ndarray:
 
 def avoidable_ties(case: Case) -> Finding | None:
     """Ties that another reward breaks, by solving for it: the paper's sum of margins leaves some of them, prices others."""
-    split = _split(case)
-    if split is None or not split[0].size:
+    rows, which, _, guessed = _split(case)
+    if rows is None or not which.size:
         return None
-    rows, which = case.rows, split[0]
-    assert rows is not None
-    states, actions = rows.states[which], rows.actions[which]
+    mend = 'margin_cap="auto" with l1=0.0: solved here, it gives the expert a margin in each of these states.'
     if case.linear:
         mend = 'margin_cap="auto"; if it stays, more or other features, or FiniteLP.'
-    else:
-        mend = 'margin_cap="auto" with l1=0.0: solved here, it gives the expert a margin in each of these states.'
-        if split[2]:
-            mend = 'margin_cap="auto" with l1=0.0; if it stays, reward_on="state-action".'
-    return Finding(
-        "avoidable-ties",
-        f"In {counted(np.unique(states).size)} the reward ties the expert with another action"
-        f"{'' if split[2] else ', though some reward prefers it'}: {named(states, actions)}. An agent may take either.",
-        mend,
-        states,
-        tuple(actions.tolist()),
-    )
+    elif guessed:
+        mend = 'margin_cap="auto" with l1=0.0; if it stays, reward_on="state-action".'
+    though = "" if guessed else ", though some reward prefers it"
+    told = f"In {{states}} the reward ties the expert with another action{though}: {{where}}. An agent may take either."
+    return _found("avoidable-ties", told, mend, rows, which)
 
 
 def unbreakable_ties(case: Case) -> Finding | None:
     """Ties that every reward of this kind leaves, where the expert is optimal: rewards that satisfy (4) form a cone."""
-    split = _split(case)
-    if split is None or not split[1].size:
+    rows, _, which, _ = _split(case)
+    if rows is None or not which.size:
         return None
-    rows, which = case.rows, split[1]
-    assert rows is not None
-    states, actions = rows.states[which], rows.actions[which]
-    kind = "reward on states" if case.on_states else "reward"
-    mend = 'reward_on="state-action"; or give the expert as the (S, A) set of its optimal actions, if both are as good.'
-    return Finding(
-        "unbreakable-ties",
-        f"In {counted(np.unique(states).size)} no {kind} under which the expert is optimal everywhere prefers its action to "
-        f"another: {named(states, actions)}.",
-        mend if case.on_states else "Give the expert as the (S, A) set of its optimal actions.",
-        states,
-        tuple(actions.tolist()),
-    )
+    kind, mend = "reward", "Give the expert as the (S, A) set of its optimal actions."
+    if case.on_states:
+        kind = "reward on states"
+        mend = 'reward_on="state-action"; or give the expert as the (S, A) set of its optimal actions, if both are as good.'
+    told = f"In {{states}} no {kind} under which the expert is optimal everywhere prefers its action to another: {{where}}."
+    return _found("unbreakable-ties", told, mend, rows, which)
 
 
-def _split(case: Case) -> tuple[np.ndarray, np.ndarray, bool] | None:
-    """Rows without a margin: those that another reward breaks, those that none does; and whether that is not known."""
-    rows = case.rows
+def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:
+    """The rows of (4); those without a margin that another reward breaks; those that none does; is the split not known?"""
+    rows, none = case.rows, np.zeros(0, dtype=np.int64)
     if rows is None or not (case.speaks and case.judges_states):
-        return None
+        return None, none, none, False
     which = _marginless(case, rows)
     if not which.size:
-        return which, which, False
-    if case.can_have_margin is None:
-        return which, which[:0], True
-    broken = case.can_have_margin[rows.states[which]]
-    return which[broken], which[~broken], False
+        return rows, none, none, False
+    possible = case.can_have_margin
+    if possible is None:
+        return rows, which, none, True
+    broken = possible[rows.states[which]]
+    return rows, which[broken], which[~broken], False

@@ -6,7 +6,7 @@ from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding, counted, named
 from irl_gym.diagnoses.unseen import entered
 from irl_gym.dynamic_programming import occupancy
-from irl_gym.metrics import TIE_TOLERANCE, policy_value, random_value, worst_tie
+from irl_gym.metrics import policy_value, random_value, worst_tie
 from irl_gym.scores import FEWEST, Scale
 
 MUCH = 0.05
@@ -29,7 +29,7 @@ def poor_expert(case: Case) -> Finding | None:
     if value is None or case.mdp is None or case.true is None or case.true_optimum is None:
         return None
     best, random = float(case.mdp.d0 @ case.true_optimum.V), random_value(case.mdp, case.true)
-    rounding = TIE_TOLERANCE * float(np.abs(case.true.values).max())
+    rounding = case.true_tie
     mend = "A better expert: plan for the true reward, train longer, or drop its bad episodes."
     if value <= random - rounding or (value <= random + rounding and best > random + rounding):
         sentence = f"earns {value:.4g}, no more than random actions, {random:.4g}, where {best:.4g} is possible"
@@ -77,7 +77,7 @@ def lossy_ties(case: Case) -> Finding | None:
     expert = _expert_value(case)
     fair = float(case.mdp.d0 @ case.true_optimum.V) if expert is None else expert
     random = random_value(case.mdp, case.true)
-    rounding = TIE_TOLERANCE * float(np.abs(case.true.values).max())
+    rounding = case.true_tie
     if fair - worst.value <= max(MUCH * abs(fair - random), rounding):
         return None
     Q = case.true_optimum.Q

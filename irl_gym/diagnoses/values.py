@@ -86,7 +86,7 @@ def _choices_vanish(case: Case, gamma: float | None) -> np.ndarray | None:
         return None
     mdp = case.mdp if gamma is None else TabularMDP(case.mdp.P, gamma, case.mdp.d0)
     Q = policy_iteration(mdp, case.true).Q[case.acting]
-    return np.asarray(Q.max(axis=1) - Q.min(axis=1) <= VANISHED * float(np.abs(case.true.values).max()))
+    return np.asarray(Q.max(axis=1) - Q.min(axis=1) <= VANISHED * case.true.largest(mdp))
 
 
 def gamma_near_one(case: Case) -> Finding | None:
@@ -96,10 +96,8 @@ def gamma_near_one(case: Case) -> Finding | None:
     margins = case.least[case.least > 0]
     if not margins.size or case.tolerance <= max(VANISHED * case.scale, 0.1 * (typical := float(np.median(margins)))):
         return None
-    R = TabularReward(case.reward.values[case.states] if case.reward is not None else np.zeros(1))
-    fine = [
-        g for g in (0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999) if g < case.mdp.gamma and tolerated(R, g) <= 0.01 * typical
-    ]
+    tried = (g for g in (0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999) if g < case.mdp.gamma)
+    fine = [g for g in tried if tolerated(case.scale, g) <= 0.01 * typical]
     mend = f"A smaller gamma: {fine[-1]:g} is safe for margins of this size." if fine else "A smaller gamma, or larger margins."
     return Finding(
         "gamma-near-one",

@@ -16,12 +16,14 @@ from irl_gym.page import compared, panels
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
+from irl_gym.page.pooled import over_seeds, spoken
 from irl_gym.page.proof import ROUNDING
 from irl_gym.page.report import page_title, policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.training import curves
 from irl_gym.page.written import number, percent, score_of, seconds
+from irl_gym.pooling import Pool, pools
 from irl_gym.runs import Run
 
 SCRIPTS = ("theme.js", "figures.js")
@@ -45,8 +47,10 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
     letters = [chr(ord("A") + i) for i in range(len(runs))]
     named = dict(zip(letters, runs, strict=True))
     scenes = {letter: Scene.of(run) for letter, run in named.items()}
+    places, found = run_places(named), pools(named)
     sections = [
         _results(named),
+        over_seeds(found, places, same=one_world(named)),
         _learning(named),
         _rewards(named, scenes),
         _policies(scenes),
@@ -55,9 +59,8 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
         _doctors(named),
     ]
     kept = [section for section in sections if section is not None]
-    places = run_places(named)
     facts = [(letter, f"{run_title(run, places[letter])} ({run.path.name})") for letter, run in named.items()]
-    context = {"title": f"{len(runs)} runs side by side", "facts": facts, "sentence": _sentence(named), "sections": kept}
+    context = {"title": f"{len(runs)} runs side by side", "facts": facts, "sentence": _sentence(named, found), "sections": kept}
     data = {"figures": specs(kept), "slider": None, "episodes": {}}
     write_page(path, "compare.html", context, data, SCRIPTS)
 
@@ -90,12 +93,17 @@ def one_world(named: Mapping[str, Run]) -> bool:
     return len(worlds) == 1
 
 
-def _sentence(named: Mapping[str, Run]) -> str:
-    """Which agent is best, by score."""
+def _sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
+    """Which agent is best, by score; of runs that only differ in their seed, how good they are together."""
     scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
         return "None of these runs has a score; each run's own page says why."
+    if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
+        return (
+            f"Over {len(named)} seeds the retrained agents have a score of {spoken(found[0].score)}, the interquartile mean "
+            "with its 95 % interval. Random actions are 0, the expert is 1."
+        )
     if not one_world(named):
         each = "; ".join(f"run {letter} {score_of(score)}" for letter, score in scores.items())
         return (

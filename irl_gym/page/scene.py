@@ -13,7 +13,7 @@ from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
 from irl_gym.dynamic_programming import backup, evaluate_policy, policy_iteration, tied
 from irl_gym.evaluation import good_actions
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import TIE_TOLERANCE
+from irl_gym.metrics import tie_tolerance
 from irl_gym.page.maps import Map
 from irl_gym.page.written import state_called
 from irl_gym.policies import as_distribution
@@ -94,7 +94,7 @@ class Scene:
     @cached_property
     def optimal(self) -> ActionSets:
         """(S, A) the actions that are optimal under the true reward."""
-        return tied(self.best[1], TIE_TOLERANCE * float(np.abs(self.table.reward.values).max()))
+        return tied(self.best[1], tie_tolerance(self.mdp, self.table.reward))
 
     @cached_property
     def good(self) -> ActionSets:

@@ -15,12 +15,12 @@ import scipy.sparse as sp
 
 from irl_gym._typing import ActionSets
 from irl_gym.dynamic_programming import Discounted, backup, tied
-from irl_gym.metrics import TIE_TOLERANCE, optimal_actions
+from irl_gym.metrics import optimal_actions, tie_tolerance
 from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, axis, blank, plotted, telling
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of, too_large
+from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.rewards import TabularReward
 
 MOST_PIECES = 240
@@ -92,8 +92,7 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     if path is None or len(path["rewards"]) == 0:
         told = scene.run.stages.get("ambiguity", {})
         why = told.get("no_path") or told.get("no_ambiguity")
-        short = too_large(why, "how the reward changes with lambda", scene.mdp.n_states)
-        return Section("lambda", TITLE, short or f"{NO_PATH} {sentence_of(why)}".strip()), None
+        return Section("lambda", TITLE, f"{NO_PATH} {sentence_of(why)}".strip()), None
     size = scene.place.layout.n_cells if scene.place is not None else 3 * BARS
     pieces = Pieces.of_path(path, min(MOST_PIECES, MOST_CELLS // size))
     pieces = replace(pieces, changes=tuple(_named(one, scene) for one in pieces.changes))
@@ -105,6 +104,10 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
         "figures": {panel.name: changing for panel, changing in shown},
     }
     thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
+    if not path.get("exact", True):
+        thinned += (
+            f" There are more pieces than were worked out: between these the objective can be {number(path['gap'], 2)} larger."
+        )
     lead = (
         "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "
         f"lambda_0 = {number(pieces.low[-1])} on it is 0. Move the slider to walk through the pieces.{thinned}"
@@ -121,7 +124,7 @@ def greedy_sets(scene: Scene, rewards: np.ndarray) -> list[ActionSets]:
     found = []
     for values in rewards:
         reward = TabularReward(values)
-        R, tolerance = reward.expected(mdp), TIE_TOLERANCE * float(np.abs(values).max())
+        R, tolerance = reward.expected(mdp), tie_tolerance(mdp, reward)
         V = factor.solve((expert * R).sum(axis=1))
         Q = backup(mdp, R, V)
         optimal = (Q.max(axis=1) <= V + tolerance + 1e-12)[~mdp.terminal].all()

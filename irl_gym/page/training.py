@@ -11,7 +11,7 @@ from irl_gym.page.compared import of_states
 from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of, too_large
+from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.runs import Run
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
@@ -101,8 +101,7 @@ def widths(scene: Scene) -> Section:
     if scene.run.widths is None:
         made = scene.run.stages.get("ambiguity", {})
         why = sentence_of(made.get("no_widths") or made.get("no_ambiguity"))
-        told = too_large(why, "how far rewards can move", scene.mdp.n_states)
-        return Section("widths", title, told or f"How wide the feasible set is was not worked out for this run. {why}".strip())
+        return Section("widths", title, f"How wide the feasible set is was not worked out for this run. {why}".strip())
     found = scene.run.widths
     over = {"width": np.fmax, "low": np.fmin, "high": np.fmax}
     width, low, high = (_of_states(found[key], scene, which) for key, which in over.items())

@@ -1,7 +1,6 @@
 """How the page writes numbers: few digits, thousands apart, and a word where there is none."""
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -97,14 +96,6 @@ def sentence_of(text: Any) -> str:
     """A reason as a sentence: with a capital and a full stop; nothing where there is none."""
     told = str(text or "").strip()
     return told and f"{told[0].upper()}{told[1:]}{'' if told[-1] in '.!?' else '.'}"
-
-
-def too_large(why: Any, what: str, n_states: int) -> str | None:
-    """A short sentence where tables of this size are not examined; None where the reason is another."""
-    found = re.search(r"at most (\d+) and \d+ are examined", str(why or ""))
-    if found is None:
-        return None
-    return f"This table has {n_states:,} states; {what} is worked out for tables of up to {found[1]}."
 
 
 def listed(values: np.ndarray, digits: int = 5) -> Any:

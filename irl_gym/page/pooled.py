@@ -1,0 +1,85 @@
+"""The section of runs that differ in their seed alone: how good a method is over its seeds, and over environments."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from irl_gym.intervals import Interval
+from irl_gym.page.panels import Panel
+from irl_gym.page.sections import Section
+from irl_gym.page.training import curves
+from irl_gym.page.written import number, percent, score_of
+from irl_gym.pooling import Pool, over_environments
+
+TRIMMED = 4
+"""Seeds from which on an interquartile mean leaves some out."""
+
+
+def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) -> Section | None:
+    """The section; None where no two runs differ in their seed alone.
+
+    Args:
+        found: the pools.
+        places: what the environment of each run is called.
+        same: are all runs of one environment, so that their values can be drawn in one figure?
+    """
+    if not found:
+        return None
+    lead = (
+        "Runs that differ in their seed alone, taken together: interquartile means with bootstrapped 95 % intervals, which "
+        "resist outliers (Agarwal et al. 2021)."
+    )
+    if min(len(pool.runs) for pool in found) < TRIMMED:
+        lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few says little."
+    columns = [_column(pool, places) for pool in found]
+    rows = [[key, *(column[key] for column in columns)] for key in columns[0]]
+    shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
+    lead += "".join(f" {_together(several, score)}" for several, score in over_environments(found))
+    drawn = {called(pool): pool.curve for pool in found if pool.curve is not None} if same else {}
+    return Section("seeds", "Over seeds", lead, [_curves(found[0], drawn)] if drawn else [], "compare", shown)
+
+
+def called(pool: Pool) -> str:
+    """The runs of a pool by their letters."""
+    return f"runs {', '.join(sorted(pool.runs))}"
+
+
+def spoken(score: Interval | None) -> str:
+    """A score with its interval."""
+    return "none" if score is None else f"{score_of(score.estimate)} ({score_of(score.low)} to {score_of(score.high)})"
+
+
+def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
+    """What the table says of a pool."""
+    config, letter = pool.first.config, next(iter(pool.runs))
+    lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values()]
+    scores = pool.scores
+    return {
+        "environment": places[letter],
+        "learner": str((config.get("learner") or {}).get("type", "")),
+        "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
+        "score of the retrained agents (95 %)": spoken(pool.score),
+        "the worst and the best seed": "none" if scores is None else f"{score_of(scores.min())} and {score_of(scores.max())}",
+        "mean return of the retrained agents (95 %)": _interval(pool.mean_return),
+        "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
+    }
+
+
+def _interval(found: Interval) -> str:
+    return f"{number(found.estimate)} ({number(found.low)} to {number(found.high)})"
+
+
+def _together(several: Sequence[Pool], score: Interval) -> str:
+    letters = "; ".join(map(called, several))
+    return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, with the draws stratified."
+
+
+def _curves(first: Pool, drawn: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Panel:
+    policies = first.first.metrics["policies"]
+    series = {name: (steps, found[:, 0], (found[:, 1], found[:, 2])) for name, (steps, found) in drawn.items()}
+    levels = {"expert": policies["expert"]["value"], "random": policies["random"]["value"]}
+    ends = "; ".join(f"{name} end at {number(values[-1])}" for name, (_, values, _) in series.items())
+    caption = (
+        f"Interquartile means with their 95 % intervals (shaded). {ends}; the expert's and random actions' levels are dashed."
+    )
+    return Panel("seed-curves", "Discounted value over seeds", caption, curves(series, levels, "discounted value"), height=400)

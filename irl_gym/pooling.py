@@ -1,0 +1,102 @@
+"""Runs that differ in nothing but their seed, taken together: interquartile means with bootstrapped 95 % intervals.
+
+A single seed says little of a method (Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the Statistical
+Precipice"). Runs with the same configuration are one pool, with one run a seed. Pools that differ in their environment alone
+are taken together once more, by their scores: the draws are stratified, seeds within each environment.
+Axes: T pools, n seeds, p points of a learning curve.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from irl_gym.intervals import Interval, iqm_interval
+from irl_gym.runs import Run
+
+SEED = ("seed",)
+PLACE = ("seed", "env_id", "env_kwargs", "dataset", "dataset_root", "table")
+"""Entries of a configuration: what pooled runs may differ in, and what pooled environments may."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Runs of one configuration, with different seeds."""
+
+    runs: Mapping[str, Run]
+    """n runs by what they are called, in the order of their seeds."""
+
+    @property
+    def first(self) -> Run:
+        """One of them, for what they share."""
+        return next(iter(self.runs.values()))
+
+    @cached_property
+    def scores(self) -> np.ndarray | None:
+        """(n,) score of each retrained agent; None where a run has none."""
+        found = [run.metrics["policies"]["retrained"]["score"] for run in self.runs.values()]
+        return None if any(one is None for one in found) else np.array(found, dtype=np.float64)
+
+    @cached_property
+    def score(self) -> Interval | None:
+        """The interquartile mean of the scores."""
+        return None if self.scores is None else over_seeds(self.scores)
+
+    @cached_property
+    def mean_return(self) -> Interval:
+        """The interquartile mean of the agents' mean undiscounted returns."""
+        found = [run.metrics["policies"]["retrained"]["mean_return"] for run in self.runs.values()]
+        return over_seeds(np.array(found, dtype=np.float64))
+
+    @cached_property
+    def curve(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """(p,) environment steps and (p, 3) interquartile mean of the value with its interval; None where steps differ."""
+        steps = [run.curve.steps for run in self.runs.values()]
+        if not len(steps[0]) or any(not np.array_equal(one, steps[0]) for one in steps):
+            return None
+        values = np.stack([run.curve.value for run in self.runs.values()])
+        return steps[0], np.array([over_seeds(column) for column in values.T])
+
+
+def over_seeds(values: np.ndarray) -> Interval:
+    """The interquartile mean of (n,) or (T, n) values with its interval; the same values have the same one."""
+    return iqm_interval(values, rng=np.random.default_rng(0))
+
+
+def pools(named: Mapping[str, Run]) -> list[Pool]:
+    """The pools of at least two seeds; of runs with the same seed the first counts.
+
+    Args:
+        named: runs by what they are called.
+    """
+    names, made = list(named), []
+    for group in _alike([run.config for run in named.values()], SEED):
+        seeds: dict[int, str] = {}
+        for i in group:
+            seeds.setdefault(named[names[i]].config["seed"], names[i])
+        if len(seeds) > 1:
+            made.append(Pool({seeds[seed]: named[seeds[seed]] for seed in sorted(seeds)}))
+    return made
+
+
+def over_environments(found: Sequence[Pool]) -> list[tuple[list[Pool], Interval]]:
+    """Pools that differ in their environment alone and have equally many seeds, with the stratified mean of their scores."""
+    scored = [(pool, scores) for pool in found if (scores := pool.scores) is not None]
+    groups = _alike([{**pool.first.config, "n": scores.size} for pool, scores in scored], PLACE)
+    return [
+        ([scored[i][0] for i in group], over_seeds(np.stack([scored[i][1] for i in group])))
+        for group in groups
+        if len(group) > 1
+    ]
+
+
+def _alike(configs: Sequence[Mapping[str, Any]], but: Sequence[str]) -> list[list[int]]:
+    """The positions of configurations that are the same but for some entries."""
+    found: dict[str, list[int]] = {}
+    for i, config in enumerate(configs):
+        rest = {name: value for name, value in config.items() if name not in but}
+        found.setdefault(json.dumps(rest, sort_keys=True), []).append(i)
+    return list(found.values())

@@ -4,6 +4,8 @@ Returns of a handful of training seeds are few and have outliers, so their mean 
 mean of the middle half, resists outliers as the median does and wastes less (Agarwal et al. 2021, "Deep Reinforcement
 Learning at the Edge of the Statistical Precipice", section 4.3). Intervals are percentile bootstraps: draw as many values
 as there are, with replacement, many times. Over several tasks the draws are stratified, seeds within each task, as there.
+Percentile bootstraps are too narrow where values are few: of normal values the interval of the mean holds the true mean 75
+times in 100 for three, 83 for five, 90 for ten and 95 for a hundred (`tests/test_intervals.py`). That of one value is a point.
 Axes: N values, T tasks, n seeds.
 """
 
@@ -19,6 +21,8 @@ from irl_gym.errors import InvalidParameter
 LEVEL = 0.95
 """Confidence of an interval."""
 RESAMPLES = 2_000
+LARGEST = 1e300
+"""Sums of larger values overflow."""
 
 
 class Interval(NamedTuple):
@@ -84,9 +88,10 @@ def _bootstrapped(
 
 
 def _checked(values: np.ndarray) -> np.ndarray:
-    """Values as floats: at least one, all finite."""
+    """Values as floats: at least one, all finite and at most 1e300."""
     array = float_array("values", values, "numbers", InvalidParameter)
-    if array.size == 0 or not np.isfinite(array).all():
-        wrong = "empty" if array.size == 0 else f"not finite ({array[~np.isfinite(array)][0]} in it)"
-        raise InvalidParameter(f"values is {wrong}: expected at least one finite return.")
+    wrong = array[~(np.abs(array) <= LARGEST)]
+    if array.size == 0 or wrong.size:
+        told = f"holds {wrong[0]}" if wrong.size else "is empty"
+        raise InvalidParameter(f"values {told}: expected at least one return, all finite and {LARGEST:g} at most.")
     return array

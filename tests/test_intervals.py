@@ -12,6 +12,22 @@ def test_mean_interval_holds_the_true_mean_about_as_often_as_it_says():
     assert 0.88 <= covered <= 0.99
 
 
+@pytest.mark.parametrize(("n", "share"), [(3, 0.75), (5, 0.83), (10, 0.90), (100, 0.95)])
+def test_mean_interval_of_few_values_is_too_narrow_as_its_module_says(n, share):
+    rng = np.random.default_rng(n)
+    intervals = [mean_interval(rng.normal(size=n), rng=rng) for _ in range(1500)]
+    assert np.mean([one.low <= 0 <= one.high for one in intervals]) == pytest.approx(share, abs=0.03)
+
+
+@pytest.mark.parametrize("interval", [mean_interval, iqm_interval])
+def test_an_interval_ends_at_the_quantiles_of_the_resamples(interval):
+    values = np.random.default_rng(0).exponential(size=12)
+    drawn = values[np.random.default_rng(5).integers(12, size=(2000, 12))]
+    statistic = (drawn if interval is mean_interval else np.sort(drawn, axis=1)[:, 3:9]).mean(axis=1)
+    found = interval(values, rng=np.random.default_rng(5))
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(statistic, [0.025, 0.975])))
+
+
 @pytest.mark.parametrize("interval", [mean_interval, iqm_interval])
 def test_an_interval_is_a_point_when_all_values_are_equal(interval):
     assert interval(np.full(10, 2.5), rng=np.random.default_rng(0)) == (2.5, 2.5, 2.5)
@@ -56,7 +72,13 @@ def test_an_interval_reads_as_text():
 @pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize(
     ("values", "told"),
-    [([], "empty"), ([1.0, np.nan], "not finite .nan in it."), (np.ones((2, 2, 2)), r"shape \(2, 2, 2\)"), (["a"], "list")],
+    [
+        ([], "empty"),
+        ([1.0, np.nan], "holds nan"),
+        (np.ones((2, 2, 2)), r"shape \(2, 2, 2\)"),
+        (["a"], "list"),
+        ([1e308, 1.0], "holds 1e.308"),
+    ],
 )
 def test_an_interval_refuses_values_that_it_cannot_resample(values, told):
     with pytest.raises(InvalidParameter, match=told):

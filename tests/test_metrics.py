@@ -3,6 +3,7 @@ import itertools
 import models
 import numpy as np
 import pytest
+import reference
 from hypothesis import given
 
 from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration
@@ -67,14 +68,20 @@ def test_optimal_actions_hold_the_expert_s(model):
     assert found[np.arange(model.mdp.n_states), model.expert].all()
 
 
+def greedy_policies(model, R):
+    """All policies that are greedy under a reward on states: from a dense Q."""
+    steps = model.P @ R
+    Q = reference.action_values(model.P, 0.9, steps, reference.values(model.P, 0.9, steps))
+    return map(np.array, itertools.product(*(np.flatnonzero(row >= row.max() - 1e-6) for row in Q)))
+
+
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("kind", ["deterministic", "terminal"])
 def test_worst_tie_is_the_worst_of_all_greedy_policies(seed, kind):
     model = models.random_model(seed, S=5, A=3, kind=kind)
     learned = TabularReward(np.round(np.random.default_rng(seed).uniform(-1, 1, 5)))  # three levels: many ties
     found = worst_tie(model.mdp, learned, TabularReward(model.R))
-    greedy_policies = itertools.product(*(np.flatnonzero(row) for row in found.tied))
-    assert found.value == pytest.approx(min(dense_value(model, np.array(policy)) for policy in greedy_policies))
+    assert found.value == pytest.approx(min(dense_value(model, policy) for policy in greedy_policies(model, learned.values)))
 
 
 def test_worst_tie_is_the_worst_policy_when_the_learned_reward_says_nothing():
@@ -132,8 +139,7 @@ def test_best_tie_is_the_best_of_all_greedy_policies(seed):
     model = models.random_model(seed, S=5, A=3, kind="terminal")
     learned = TabularReward(np.round(np.random.default_rng(seed).uniform(-1, 1, 5)))
     found = best_tie(model.mdp, learned, TabularReward(model.R))
-    greedy_policies = itertools.product(*(np.flatnonzero(row) for row in found.tied))
-    assert found.value == pytest.approx(max(dense_value(model, np.array(policy)) for policy in greedy_policies))
+    assert found.value == pytest.approx(max(dense_value(model, policy) for policy in greedy_policies(model, learned.values)))
 
 
 @given(model=models.models())
@@ -189,9 +195,30 @@ def test_tie_aware_agreement_counts_ties_broken_otherwise():
 
 
 def test_tie_aware_agreement_is_zero_for_the_opposite_reward():
-    model = models.random_model(0, kind="deterministic")
-    opposite = tie_aware_agreement(model.mdp, TabularReward(-model.R), model.expert)
-    assert opposite < tie_aware_agreement(model.mdp, TabularReward(model.R), model.expert) == 1.0
+    opposite = np.array([0.0, -1.0, 1.0])
+    assert tie_aware_agreement(two_ways(), opposite, ZEROS) == 0.0
+    assert tie_aware_agreement(two_ways(), -opposite, ZEROS) == 1.0
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_optimal_actions_are_those_of_the_reward_in_other_units(scale):
+    for model in (models.random_model(seed, kind="deterministic") for seed in range(5)):
+        ties = optimal_actions(model.mdp, model.R)
+        assert (optimal_actions(model.mdp, scale * model.R) == ties).all()
+
+
+@pytest.mark.parametrize("number", [1e9, -1e9])
+def test_ties_do_not_depend_on_rows_that_no_episode_reads(number):
+    model = models.random_model(0, kind="terminal")
+    R = model.step_reward.copy()
+    R[model.mdp.terminal] = number
+    assert (optimal_actions(model.mdp, R) == optimal_actions(model.mdp, model.step_reward)).all()
+    P = np.zeros((8, 3, 8))
+    P[:7, :, :7] = model.P
+    P[7, :, 7] = 1.0  # a state that nothing leads to
+    larger = TabularMDP.from_dense(P, 0.9, np.append(model.mdp.d0, 0.0))
+    ties = optimal_actions(larger, np.append(model.R, number))
+    assert (ties[:7] == optimal_actions(model.mdp, model.R)).all()
 
 
 def two_ways():

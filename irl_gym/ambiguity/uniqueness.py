@@ -31,6 +31,10 @@ SAME = 1e-6
 """Widths up to this, in units of R_max, are the solver's rounding."""
 
 
+LEAST_L1 = 1e-8
+"""Prices of the norm below this are lost in the solver's tolerance."""
+
+
 @dataclass(frozen=True, eq=False)
 class Face:
     """All optima of a program: the least and the largest reward of each state among them."""
@@ -97,13 +101,14 @@ def optimal_face(
         mdp: only states reachable from d0 have a reward.
         expert: (S,) actions, (S, A) probabilities or (S, A) set, known in every reachable state.
         learner: whose program it is; the default is `FiniteLP()`.
-        tolerance: a row or bound whose price in the objective is below this may be left.
+        tolerance: a row or bound whose price in the objective is below this may be left. Of a program with a small price on the
+            norm, a tenth of that, if it is less.
         workers: processes, as in `feasible_widths`.
 
     Raises:
         InvalidMDP, InvalidPolicy: not a TabularMDP, or an expert of the wrong shape or content.
         InvalidParameter: a learner with slack, an expert that is not known everywhere (their programs say R = min over actions,
-            so their optima are no face), or a tolerance not above 0.
+            so their optima are no face), a price on the norm below 1e-8, or a tolerance not above 0.
         DegenerateExpert: no reward has a margin.
         SolverTimeout, SolverFailed: no answer.
     """
@@ -121,7 +126,10 @@ def optimal_face(
             "`feasible_widths` takes such an expert."
         )
     l1, cap, counted = _settled(mdp, expert, learner, posed)
-    sparsest = learner.margin_cap == "auto" and l1 == 0
+    if 0 < l1 < LEAST_L1:
+        raise InvalidParameter(f"l1 is {l1:g}: expected 0 or at least {LEAST_L1:g}; a smaller price is the solver's rounding.")
+    tolerance = min(tolerance, l1 / 10) if l1 > 0 else tolerance
+    sparsest = bool(learner.margin_cap == "auto" and l1 == 0)
     r_max, top = learner.r_max, np.inf if cap is None else cap / learner.r_max
     program = PricedRewards(posed.part, posed.comparisons, on_states=learner.reward_on == "state", counted=counted)
     polytope = program.polytope(1.0, top if sparsest else 0.0, top)
@@ -134,7 +142,7 @@ def optimal_face(
     shape = (-1,) if program.on_states else (-1, mdp.n_actions)
     low, high = (over_all_states(posed, mdp, values.reshape(shape)) for values in (low, high))
     objective = r_max * (vertex.objective if sparsest else -vertex.objective)
-    return Face(low, high, objective, sparsest, r_max, l1, cap)
+    return Face(low, high, objective, sparsest, float(r_max), l1, None if cap is None else float(cap))
 
 
 def _settled(mdp: TabularMDP, expert: Any, learner: FiniteLP, posed: Posed) -> tuple[float, float | None, np.ndarray]:

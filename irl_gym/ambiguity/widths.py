@@ -73,6 +73,8 @@ class Widths:
     def __str__(self) -> str:
         """The widths in two sentences."""
         width = self.width[np.isfinite(self.width)]
+        if not width.size:
+            return "No widths: every state that is reached is terminal, so no step is taken."
         kind = "states" if self.reward_on == "state" else "states and actions"
         return (
             f"Widths from {width.min():.3g} to {width.max():.3g}, {np.median(width):.3g} in the middle, over {width.size} "
@@ -138,8 +140,8 @@ def feasible_widths(
         low=over_all_states(posed, mdp, r_max * low),
         high=over_all_states(posed, mdp, r_max * high),
         reward_on=reward_on,
-        r_max=r_max,
-        margin=tau,
+        r_max=float(r_max),
+        margin=float(tau),
         with_margin=with_margin,
         pinned=tuple((where, float(value)) for where, value in (pinned or {}).items()),
         attained=bool(posed.known.all()),

@@ -36,6 +36,10 @@ class Canonical(Protocol):
         """(n,) the canonical reward on the transitions of a coverage distribution."""
         ...
 
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """How far rounding can put a value off: a share of the largest reward that is read."""
+        ...
+
 
 @dataclass(frozen=True)
 class AsGiven:
@@ -44,6 +48,10 @@ class AsGiven:
     def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
         """(n,) R(s, a, s')."""
         return reward.at(coverage.states, coverage.actions, coverage.next_states)
+
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """0: nothing is computed."""
+        return 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +83,10 @@ class FreshDraws:
         future = D_S @ mean / (1 - mdp.gamma * D_S[acting].sum())  # E[W(S')]
         W = np.where(acting, mean + mdp.gamma * future, 0.0)
         return AsGiven().values(mdp, reward.shaped(W, mdp.gamma), coverage)
+
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """Every triple out of a state that acts is read."""
+        return reward.precision * reward.largest(~mdp.terminal) / (1 - mdp.gamma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +126,10 @@ class ModelDraws:
         more = beyond_s[s] + beyond_next[following] + (0 if both is None else both[s, following])
         return reward.at(s, a, following) + mdp.gamma * one_step[following] - one_step[s] - mdp.gamma * more
 
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """Triples out of terminal states are read too."""
+        return reward.precision * reward.largest(np.ones(mdp.n_states, dtype=bool))
+
 
 @dataclass(frozen=True, eq=False)
 class ValueAdjustedLevelling:
@@ -134,6 +150,10 @@ class ValueAdjustedLevelling:
         uniform = np.full(R.shape, 1 / mdp.n_actions)
         V = evaluate_policy(mdp, R, uniform if self.policy is None else self.policy)
         return _shaped_values(mdp, reward, R, V, coverage, self.levelled)
+
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """Possible transitions are read; without levelling covered ones too."""
+        return _rounding(mdp, reward, coverage, self.levelled)
 
 
 @dataclass(frozen=True)
@@ -164,6 +184,17 @@ class MinimalNorm:
         Phi = np.zeros(mdp.n_states)
         Phi[~mdp.terminal] = _least_squares(sp.csr_array(system)[:, np.flatnonzero(~mdp.terminal)], right, weights)
         return _shaped_values(mdp, reward, R, Phi, coverage, self.levelled)
+
+    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+        """Possible transitions are read; without levelling covered ones too."""
+        return _rounding(mdp, reward, coverage, self.levelled)
+
+
+def _rounding(mdp: TabularMDP, reward: Payments, coverage: Coverage, levelled: bool) -> float:
+    """What rounding leaves of values of a policy, and of what is computed from them."""
+    read = [coverage_of(mdp, None)] if levelled else [coverage_of(mdp, None), coverage]
+    largest = max(float(np.abs(AsGiven().values(mdp, reward, which)).max()) for which in read)
+    return reward.precision * largest / (1 - mdp.gamma)
 
 
 def _shaped_values(

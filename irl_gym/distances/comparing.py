@@ -7,12 +7,30 @@ Pearson's distance sqrt((1 - rho) / 2) is half the norm of the difference of the
 import numpy as np
 
 from irl_gym._typing import Numbers
-from irl_gym.errors import UndefinedDistance
+from irl_gym.checks import float_array
+from irl_gym.errors import InvalidReward, UndefinedDistance
 
 ROUNDING = 1e-12
 """Values of which the canonical form is this share of the reward, or less, are rounding: the canonical form is 0."""
-SAME_RANK = 1e-9
-"""Values closer than this share of their spread have the same rank: they differ by rounding."""
+DIGITS = 10
+"""The same for numbers of low precision: this times the step from 1 to the next number, 1.2e-6 for float32."""
+LARGEST = 1e300
+"""Sums of larger rewards overflow."""
+
+
+def numbers(name: str, values: object, expected: str) -> tuple[np.ndarray, float]:
+    """Rewards as floats, and the share of the largest by which their sums can be off.
+
+    Raises:
+        InvalidReward: no numbers, numbers that are not finite, or beyond 1e300.
+    """
+    array = float_array(name, values, expected, InvalidReward)
+    wrong = np.argwhere(~(np.abs(array) <= LARGEST))
+    if wrong.size:
+        where = tuple(int(i) for i in wrong[0])
+        raise InvalidReward(f"{name} is {array[where]} at {list(where)}: a reward is a finite number, {LARGEST:g} at most.")
+    dtype = np.asarray(values).dtype
+    return array, max(ROUNDING, DIGITS * float(np.finfo(dtype).eps)) if dtype.kind == "f" else ROUNDING
 
 
 def norm(values: Numbers, weights: Numbers, order: float) -> float:
@@ -24,28 +42,29 @@ def norm(values: Numbers, weights: Numbers, order: float) -> float:
 
 
 def standardised(values: Numbers, weights: Numbers, rounding: float, name: str) -> Numbers:
-    """Values with mean 0 and variance 1.
+    """Values (n,), each off by `rounding` at most, with mean 0 and variance 1.
 
     Raises:
         UndefinedDistance: a variance of 0, but for rounding.
     """
     centred = values - weights @ values
-    deviation = norm(centred, weights, 2)
-    if not deviation > rounding:
+    deviation, least = norm(centred, weights, 2), max(rounding, ROUNDING * float(np.abs(values).max()))
+    if not deviation > least:
         raise UndefinedDistance(
-            f"the canonical form of {name} has deviation {deviation:.1e} on the coverage distribution: expected more than 0, "
-            "or its distance from another is not defined. The reward is zero, constant or only a potential, or the coverage "
-            "too narrow. `starc` has a place for such rewards."
+            f"the canonical form of {name} has deviation {deviation:.1e} on the coverage distribution: expected more than "
+            f"rounding, {least:.1e}, or its distance from another is not defined. The reward is zero, constant or only a "
+            "potential, or the coverage too narrow. `starc` has a place for such rewards."
         )
     return centred / deviation
 
 
 def ranks(values: Numbers, weights: Numbers, rounding: float) -> Numbers:
-    """The share of weight below each value, and half of the share at it: ranks between 0 and 1, ties in the middle."""
+    """The share of weight below each value, and half of the share at it: ranks between 0 and 1, ties in the middle.
+
+    Values are tied with the next larger one if they differ by `rounding` or less.
+    """
     order = np.argsort(values, kind="stable")
-    ordered = values[order]
-    tied = max(SAME_RANK * (ordered[-1] - ordered[0]), rounding)
-    group = np.concatenate([[0], np.cumsum(np.diff(ordered) > tied)])
+    group = np.concatenate([[0], np.cumsum(np.diff(values[order]) > rounding)])
     share = np.bincount(group, weights[order])
     result = np.empty(values.size)
     result[order] = (np.cumsum(share) - share / 2)[group]

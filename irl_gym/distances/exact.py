@@ -54,8 +54,9 @@ class RewardDistance:
 
     def _standard(self, mdp: TabularMDP, reward: Any, name: str, coverage: Coverage) -> Numbers:
         given = payments(mdp, reward, name)
-        values = self.form().values(mdp, given, coverage)
-        return self._scaled(values, coverage.weights, ROUNDING * given.size / (1 - mdp.gamma), name)
+        form = self.form()
+        values = form.values(mdp, given, coverage)
+        return self._scaled(values, coverage.weights, form.rounding(mdp, given, coverage), name)
 
     def distance(self, mdp: TabularMDP, first: Any, second: Any) -> float:
         """The distance of two rewards, between 0 and 1 (STARC with two different norms: at least 0).
@@ -201,6 +202,8 @@ def distance_matrix(distance: RewardDistance, mdp: TabularMDP, rewards: Mapping[
     if not isinstance(rewards, Iterable):
         raise InvalidReward(f"rewards is a {type(rewards).__name__}: expected several rewards, or a mapping of names to them.")
     named = rewards if isinstance(rewards, Mapping) else {f"reward {i}": one for i, one in enumerate(rewards)}
+    if not named:
+        raise InvalidReward("rewards is empty: expected at least one reward.")
     coverage = coverage_of(mdp, distance.coverage)
     standard = [distance._standard(mdp, one, name, coverage) for name, one in named.items()]
     return np.array([[half_difference(x, y, coverage.weights, distance.order) for y in standard] for x in standard])
@@ -227,14 +230,16 @@ def starc(
     coverage: Any = None,
 ) -> float:
     """STARC distance of two rewards; see `STARC`."""
-    return STARC(canonical or ValueAdjustedLevelling(), norm, metric, coverage).distance(mdp, first, second)
+    return STARC(ValueAdjustedLevelling() if canonical is None else canonical, norm, metric, coverage).distance(
+        mdp, first, second
+    )
 
 
 def pearson(mdp: TabularMDP, first: Any, second: Any, *, canonical: Canonical | None = None, coverage: Any = None) -> float:
     """Pearson distance of two canonical rewards; see `Pearson`."""
-    return Pearson(canonical or FreshDraws(), coverage).distance(mdp, first, second)
+    return Pearson(FreshDraws() if canonical is None else canonical, coverage).distance(mdp, first, second)
 
 
 def spearman(mdp: TabularMDP, first: Any, second: Any, *, canonical: Canonical | None = None, coverage: Any = None) -> float:
     """Spearman distance of two canonical rewards; see `Spearman`."""
-    return Spearman(canonical or FreshDraws(), coverage).distance(mdp, first, second)
+    return Spearman(FreshDraws() if canonical is None else canonical, coverage).distance(mdp, first, second)

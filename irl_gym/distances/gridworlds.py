@@ -23,6 +23,14 @@ CELLS = {
 """What each cell pays; Dense is 4 Sparse - 1, and is shaped below. Distances that the paper prints settle the numbers:
 Sparse-Path 0.1602 (figure A.2) the goal's 4, and Path-Cliff 0.27 (figure 2) the cliff's -4."""
 
+PRINTED = {
+    ("Sparse", "Dense"): "0.0000",
+    ("Sparse", "Center"): "0.7500",
+    ("Sparse", "Path"): "0.1602",
+    ("Path", "Cliff"): "0.27",
+}
+"""EPIC distances as the paper prints them, where its print was at hand: figure A.2(a), and the caption of figure 2."""
+
 
 def gridworld() -> TabularMDP:
     """The table, with uniform starts."""
@@ -41,3 +49,13 @@ def gridworld_rewards() -> dict[str, np.ndarray]:
     Phi = -3.0 * (np.abs(s // 3 - GOAL // 3) + np.abs(s % 3 - GOAL % 3))  # nearer to the goal is better
     rewards["Dense"] = rewards["Dense"] + GAMMA * Phi - Phi[:, None, None]
     return rewards
+
+
+def other_than_printed(matrix: np.ndarray) -> list[str]:
+    """What differs from the paper's print in a matrix (6, 6) of EPIC distances, in the order of the figure."""
+    place, told = {name: i for i, name in enumerate(CELLS)}, []
+    for (one, other), printed in PRINTED.items():
+        distance = float(matrix[place[one], place[other]])
+        if f"{distance:.{len(printed) - 2}f}" != printed:
+            told.append(f"{one}-{other} is {distance:.4f}: the paper prints {printed}")
+    return told

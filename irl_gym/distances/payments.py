@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym._typing import Matrix, Vector
-from irl_gym.checks import float_array
+from irl_gym._typing import Matrix, StateMask, Vector
+from irl_gym.distances.comparing import numbers
 from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TabularMDP, checked_mdp, entry_rows
 from irl_gym.rewards import TabularReward
@@ -28,6 +28,8 @@ class Payments:
     """(S,)."""
     full: np.ndarray | None
     """(S, A, S), or None for 0."""
+    precision: float
+    """The share of the largest reward by which a sum of them can be off."""
 
     def at(self, states: np.ndarray, actions: np.ndarray, next_states: np.ndarray) -> np.ndarray:
         """(n,) what transitions pay."""
@@ -36,7 +38,7 @@ class Payments:
 
     def shaped(self, potential: Vector, gamma: float) -> "Payments":
         """R(s, a, s') + gamma Phi(s') - Phi(s)."""
-        return Payments(self.step - potential[:, None], self.arrival + gamma * potential, self.full)
+        return Payments(self.step - potential[:, None], self.arrival + gamma * potential, self.full, self.precision)
 
     def expected(self, mdp: TabularMDP) -> Matrix:
         """(S, A) the mean over successors; 0 in terminal states, which take no step."""
@@ -53,11 +55,10 @@ class Payments:
         mean = self.step @ actions + self.arrival @ next_states
         return mean if self.full is None else mean + np.einsum("sax,a,x->s", self.full, actions, next_states)
 
-    @property
-    def size(self) -> float:
-        """The largest |value| of a part: rounding is relative to it."""
-        parts = [self.step, self.arrival] + ([] if self.full is None else [self.full])
-        return max(float(np.abs(part).max()) for part in parts)
+    def largest(self, states: StateMask) -> float:
+        """The largest |value| of a part, of steps out of some states (S,): possible ones or not."""
+        parts = [self.step[states], self.arrival] + ([] if self.full is None else [self.full[states]])
+        return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
 
 def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments:
@@ -65,23 +66,21 @@ def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments
 
     Raises:
         InvalidMDP: no table.
-        InvalidReward: another shape than the table's, or values that are not finite.
+        InvalidReward: another shape than the table's, or values that are not finite, or beyond 1e300.
     """
     values = reward.values if isinstance(reward, TabularReward) else reward
     if hasattr(values, "tabular"):
         raise InvalidReward(f"{name} is a {type(values).__name__}: expected a table. Pass `reward.tabular(states)`.")
     S, A = checked_mdp(mdp).n_states, mdp.n_actions
-    array = float_array(name, values, "(S,), (S, A) or (S, A, S) numbers", InvalidReward)
+    array, precision = numbers(name, values, "(S,), (S, A) or (S, A, S) numbers")
     if array.shape not in ((S,), (S, A), (S, A, S)):
         raise InvalidReward(
             f"{name} has shape {array.shape}: expected ({S},), ({S}, {A}) or ({S}, {A}, {S}), for the {S} states and {A} "
             "actions of the table. Is it another environment's?"
         )
-    wrong = np.argwhere(~np.isfinite(array))
-    if wrong.size:
-        where = tuple(int(i) for i in wrong[0])
-        raise InvalidReward(f"{name} is {array[where]} at {list(where)}: a reward is a finite number.")
-    nothing = np.zeros((S, A))
-    if array.ndim == 1:
-        return Payments(nothing, array, None)
-    return Payments(array, np.zeros(S), None) if array.ndim == 2 else Payments(nothing, np.zeros(S), array)
+    return Payments(
+        array if array.ndim == 2 else np.zeros((S, A)),
+        array if array.ndim == 1 else np.zeros(S),
+        array if array.ndim == 3 else None,
+        precision,
+    )

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from irl_gym._typing import Numbers
-from irl_gym.checks import float_array
-from irl_gym.distances.comparing import ROUNDING
+from irl_gym.distances.comparing import numbers
 from irl_gym.distances.jackknife import Distance, correlation_distance, jackknife
 from irl_gym.distances.transitions import FreshSample, Transitions
 from irl_gym.errors import InvalidParameter, InvalidReward
@@ -27,33 +26,47 @@ Sample = TypeVar("Sample", Transitions, FreshSample)
 
 BLOCKS = 50
 """Blocks of transitions left out in turn."""
+ROWS = 20_000
+"""Transitions that a reward or a model is asked about at once, if they are copies made here."""
 DRAW_BLOCKS = 20
 """Blocks of fresh draws left out in turn."""
 
 
-def paid(reward: RewardCall, observations: Any, actions: np.ndarray, next_observations: Any) -> Numbers:
-    """(N,) what a reward function says of transitions.
+class Payer:
+    """A reward function whose answers are checked, and how large and how precise they were so far.
 
     Raises:
-        InvalidReward: it is no function, or gives another shape, or a value that is not finite.
+        InvalidReward: no function.
     """
-    if not callable(reward):
-        raise InvalidReward(
-            f"the reward is a {type(reward).__name__}: expected a function of (observations, actions, next observations), such "
-            "as the `pay` of a TabularReward where observations are rows of its table."
-        )
-    values = float_array("what the reward function returns", reward(observations, actions, next_observations),
-                         "(N,) numbers", InvalidReward)  # fmt: skip
-    if values.shape != (len(actions),):
-        raise InvalidReward(
-            f"the reward function gives shape {values.shape} for {len(actions)} transitions: expected ({len(actions)},)."
-        )
-    wrong = np.flatnonzero(~np.isfinite(values))
-    if wrong.size:
-        raise InvalidReward(
-            f"the reward function gives {values[wrong[0]]} for transition {wrong[0]}: expected a finite number."
-        )
-    return values
+
+    def __init__(self, reward: RewardCall):
+        if not callable(reward):
+            raise InvalidReward(
+                f"the reward is a {type(reward).__name__}: expected a function of (observations, actions, next observations), "
+                "such as the `pay` of a TabularReward where observations are rows of its table."
+            )
+        self.reward, self.largest, self.precision = reward, 0.0, 0.0
+
+    def __call__(self, observations: Any, actions: np.ndarray, next_observations: Any) -> Numbers:
+        """(N,) what it says of transitions.
+
+        Raises:
+            InvalidReward: it gives another shape, or a value that is not finite or beyond 1e300.
+        """
+        given = self.reward(observations, actions, next_observations)
+        values, precision = numbers("what the reward function returns", given, "(N,) numbers")
+        if values.shape != (len(actions),):
+            raise InvalidReward(
+                f"the reward function gives shape {values.shape} for {len(actions)} transitions: expected ({len(actions)},)."
+            )
+        self.largest = max(self.largest, float(np.abs(values).max(initial=0.0)))
+        self.precision = max(self.precision, precision)
+        return values
+
+    @property
+    def rounding(self) -> float:
+        """How far sums of its answers can be off."""
+        return self.precision * self.largest
 
 
 def checked_sample(sample: Any, kind: type[Sample]) -> Sample:
@@ -87,10 +100,14 @@ def sampled_epic(first: RewardCall, second: RewardCall, transitions: Transitions
     return _correlated(first, second, transitions, checked_sample(fresh, FreshSample), ranked=False)
 
 
-def sampled_pearson(
-    first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None = None
-) -> Distance:
-    """Pearson distance of two reward functions, as they are, or in EPIC's canonical form where `fresh` is given.
+def sampled_pearson(first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None) -> Distance:
+    """Pearson distance of two reward functions.
+
+    Args:
+        first: R(observations, actions, next_observations) -> (N,).
+        second: the other.
+        transitions: from the coverage distribution D.
+        fresh: for EPIC's canonical form, as `pearson` has it where nothing is said; None for the rewards as they are.
 
     Raises:
         InvalidReward: a function that gives another shape, or a value that is not finite.
@@ -100,16 +117,8 @@ def sampled_pearson(
     return _correlated(first, second, transitions, fresh, ranked=False)
 
 
-def sampled_spearman(
-    first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None = None
-) -> Distance:
-    """Spearman distance of two reward functions, as they are, or in EPIC's canonical form where `fresh` is given.
-
-    Raises:
-        InvalidReward: a function that gives another shape, or a value that is not finite.
-        InvalidParameter: something else than transitions or fresh draws.
-        UndefinedDistance: a reward that is constant on the transitions.
-    """
+def sampled_spearman(first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample | None) -> Distance:
+    """Spearman distance of two reward functions: that of the ranks. See `sampled_pearson`."""
     return _correlated(first, second, transitions, fresh, ranked=True)
 
 
@@ -140,29 +149,32 @@ class _Canonical:
     """The canonical values of a reward function on transitions, with any block of the fresh draws left out."""
 
     def __init__(self, reward: RewardCall, transitions: Transitions, fresh: FreshSample | None):
-        here, following = transitions.observations, transitions.next_observations
-        self._given = paid(reward, here, transitions.actions, following)
+        here, following, pays = transitions.observations, transitions.next_observations, Payer(reward)
+        self._given = pays(here, transitions.actions, following)
         self._fresh, self._going = fresh, ~transitions.ended
-        self.rounding = ROUNDING * float(np.abs(self._given).max())
+        self.rounding = 0.0
         if fresh is None:
             return
         self.n_blocks = min(DRAW_BLOCKS, len(fresh))
         self._block = np.arange(len(fresh)) * self.n_blocks // len(fresh)
         self._counts = np.bincount(self._block)
-        self._here = self._sums(reward, here, fresh)
-        self._next = self._sums(reward, following, fresh)
-        self._at_draws = self._sums(reward, fresh.states, fresh) if transitions.ended.any() else None
-        self.rounding = max(self.rounding, ROUNDING * float(np.abs(self._here).max()) / self._counts.min() / (1 - fresh.gamma))
+        self._here = self._sums(pays, here, fresh)
+        self._next = self._sums(pays, following, fresh)
+        self._at_draws = self._sums(pays, fresh.states, fresh) if transitions.ended.any() else None
+        self.rounding = pays.rounding / (1 - fresh.gamma)
 
-    def _sums(self, reward: RewardCall, observations: Any, fresh: FreshSample) -> np.ndarray:
-        """(N, blocks) sums of R(s, A, S') over the draws of each block."""
+    def _sums(self, pays: Payer, observations: Any, fresh: FreshSample) -> np.ndarray:
+        """(N, blocks) sums of R(s, A, S') over the draws of each block; `ROWS` evaluations at once."""
         n = batch_size(observations)
         sums = np.zeros((n, self.n_blocks))
         for b in range(self.n_blocks):
             draws = np.flatnonzero(self._block == b)
-            every, drawn = np.repeat(np.arange(n), draws.size), np.tile(draws, n)
-            values = paid(reward, take(observations, every), fresh.actions[drawn], take(fresh.states, drawn))
-            sums[:, b] = values.reshape(n, draws.size).sum(axis=1)
+            many = max(1, ROWS // draws.size)
+            for first in range(0, n, many):
+                here = np.arange(first, min(first + many, n))
+                every, drawn = np.repeat(here, draws.size), np.tile(draws, here.size)
+                values = pays(take(observations, every), fresh.actions[drawn], take(fresh.states, drawn))
+                sums[here, b] = values.reshape(here.size, draws.size).sum(axis=1)
         return sums
 
     def values(self, without: int | None) -> Numbers:

@@ -11,16 +11,13 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.distances.comparing import ROUNDING
 from irl_gym.distances.jackknife import Distance, jackknife, replicated_distance
 from irl_gym.distances.models import Model, stepped
-from irl_gym.distances.sampled import BLOCKS, RewardCall, checked_sample, paid
+from irl_gym.distances.sampled import BLOCKS, ROWS, Payer, RewardCall, checked_sample
 from irl_gym.distances.transitions import Transitions
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import check_discount
 
-ROWS = 20_000
-"""Rollouts made side by side, or as many as there are transitions."""
 Acting = Callable[[Any, np.random.Generator], np.ndarray]
 """A policy: (observations, rng) -> (N, ...) actions."""
 
@@ -59,18 +56,18 @@ def sampled_dard(
         raise InvalidParameter(f"actions is {actions!r}: expected an array of actions to draw from, such as `np.arange(A)`.")
     transitions = checked_sample(transitions, Transitions)
     here, following = _array(transitions.observations), _array(transitions.next_observations)
-    ended, rewards = transitions.ended, (first, second)
+    rewards = (Payer(first), Payer(second))
     values = np.empty((2, len(transitions), K))
-    given = [paid(reward, here, transitions.actions, following) for reward in rewards]
+    given = [pays(here, transitions.actions, following) for pays in rewards]
+    ended = transitions.ended.reshape(-1, *[1] * (following.ndim - 1))
     for k in range(K):
         drawn = choices[rng.integers(len(choices), size=len(transitions))]
         after_here, _ = stepped(model, here, drawn, rng)
-        after_next = np.array(following)
-        after_next[~ended] = stepped(model, following, drawn, rng)[0][~ended]
-        for r, reward in enumerate(rewards):
-            more = paid(reward, following, drawn, after_next) - paid(reward, after_here, drawn, after_next)
-            values[r, :, k] = given[r] + gamma * more - paid(reward, here, drawn, after_here)
-    return _estimated(values, transitions, gamma, centred=True)
+        after_next = np.where(ended, following, stepped(model, following, drawn, rng)[0])
+        for r, pays in enumerate(rewards):
+            more = pays(following, drawn, after_next) - pays(after_here, drawn, after_next)
+            values[r, :, k] = given[r] + gamma * more - pays(here, drawn, after_here)
+    return _estimated(values, transitions, max(one.rounding for one in rewards), centred=True)
 
 
 def sampled_starc(
@@ -111,7 +108,7 @@ def sampled_starc(
     policy = _called("policy", policy, "`lambda observations, rng: agent.predict(observations)[0]`")
     transitions = checked_sample(transitions, Transitions)
     steps = int(checked_number("horizon", horizon, "a whole number of at least 1", least=1, whole=True))
-    here, rewards = _array(transitions.observations), (first, second)
+    here, rewards = _array(transitions.observations), (Payer(first), Payer(second))
     values = np.empty((2, len(transitions), K))
     together = max(ROWS // len(here), 1)
     for done in range(0, K, together):
@@ -120,11 +117,11 @@ def sampled_starc(
         gains = _returns(rewards, model, policy, many, begin, gamma, steps, rng)
         gains -= _returns(rewards, model, policy, many, None, gamma, steps, rng)
         values[:, :, done : done + k] = gains.reshape(2, -1, k)
-    return _estimated(values, transitions, gamma, centred=False)
+    return _estimated(values, transitions, max(one.rounding for one in rewards) / (1 - gamma), centred=False)
 
 
 def _returns(
-    rewards: tuple[RewardCall, ...],
+    rewards: tuple[Payer, ...],
     model: Model,
     policy: Acting,
     here: np.ndarray,
@@ -137,10 +134,10 @@ def _returns(
     total = np.zeros((len(rewards), len(here)))
     going, discount = np.ones(len(here), dtype=bool), 1.0
     for t in range(steps):
-        drawn = begin if t == 0 and begin is not None else policy(here, rng)
-        following, ended = stepped(model, here, np.asarray(drawn), rng)
-        for r, reward in enumerate(rewards):
-            total[r, going] += discount * paid(reward, here[going], np.asarray(drawn)[going], following[going])
+        drawn = begin if t == 0 and begin is not None else _acted(policy, here, rng)
+        following, ended = stepped(model, here, drawn, rng)
+        for r, pays in enumerate(rewards):
+            total[r, going] += discount * pays(here[going], drawn[going], following[going])
         going = going & ~ended
         here, discount = following, discount * gamma
         if not going.any():
@@ -148,9 +145,19 @@ def _returns(
     return total
 
 
-def _estimated(values: np.ndarray, transitions: Transitions, gamma: float, *, centred: bool) -> Distance:
+def _acted(policy: Acting, here: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(N, ...) what a policy does."""
+    found = policy(here, rng)
+    if isinstance(found, tuple) or np.shape(found)[:1] != (len(here),):
+        raise InvalidParameter(
+            f"the policy gives a {type(found).__name__} for {len(here)} observations: expected an array with one action for "
+            "each. Of SB3's predict take the first part: `lambda observations, rng: agent.predict(observations)[0]`."
+        )
+    return np.asarray(found)
+
+
+def _estimated(values: np.ndarray, transitions: Transitions, rounding: float, *, centred: bool) -> Distance:
     """The distance of replicated canonical values (2, N, K), and its error."""
-    rounding = ROUNDING * float(np.abs(values).max()) / (1 - gamma)
     block = transitions.blocks(BLOCKS)
 
     def distance(kept: np.ndarray | slice) -> float:

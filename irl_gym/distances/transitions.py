@@ -17,7 +17,9 @@ from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDis
 from irl_gym.features import batch_size, by_part, take
 from irl_gym.mdp import check_discount
 
-OPTIONAL = ("terminated", "groups", "terminal")
+FLAGS = ("terminated", "terminal")
+"""Parts of a sample that say yes or no."""
+OPTIONAL = (*FLAGS, "groups")
 """Parts of a sample that may be None."""
 
 
@@ -26,7 +28,7 @@ class Transitions:
     """N transitions (s, a, s') from a coverage distribution.
 
     Raises:
-        InvalidParameter: parts that are not arrays, or lengths that do not fit together.
+        InvalidParameter: parts that are not arrays, lengths that do not fit together, or flags of another kind.
         UndefinedDistance: fewer than two transitions.
     """
 
@@ -130,6 +132,11 @@ class FreshSample:
             InvalidParameter: n that is not a whole number of at least 2, or an rng that is none.
             InvalidDiscount: gamma outside (0, 1).
         """
+        if not isinstance(transitions, Transitions):
+            raise InvalidParameter(
+                f"transitions is a {type(transitions).__name__}: expected Transitions, such as "
+                "`Transitions.from_episodes(episodes)`."
+            )
         rng = checked_rng(rng)
         n = int(checked_number("n", n, "a whole number of at least 2", least=2, whole=True))
         states, actions = rng.integers(len(transitions), size=(2, n))
@@ -144,6 +151,15 @@ def _checked_lengths(sample: Any, names: tuple[str, ...]) -> int:
     wrong = {name: count for name, count in counts.items() if count != n}
     if wrong:
         raise InvalidParameter(f"there are {n} actions and {wrong}: expected as many of each.")
+    for name in counts.keys() & set(OPTIONAL):
+        part = np.asarray(given[name])
+        if part.ndim != 1:
+            raise InvalidParameter(
+                f"{name} has shape {part.shape}: expected ({n},), one for each. Of shape ({n}, 1) it is `{name}.ravel()`."
+            )
+        odd = part[~np.isin(part, (0, 1))] if name in FLAGS else part[:0]
+        if odd.size:
+            raise InvalidParameter(f"{name} holds {odd[0]}: expected True and False, or 1 and 0.")
     return n
 
 

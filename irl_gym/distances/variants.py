@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from irl_gym.distances.canonical import AsGiven, MinimalNorm
+from irl_gym.distances.canonical import AsGiven, MinimalNorm, ValueAdjustedLevelling
 from irl_gym.distances.exact import DARD, EPIC, STARC, Pearson, RewardDistance, Spearman
 
 VARIANTS: Mapping[str, RewardDistance] = {
@@ -12,8 +12,12 @@ VARIANTS: Mapping[str, RewardDistance] = {
     "STARC, minimal norm": STARC(MinimalNorm()),
     "STARC, VAL, L1": STARC(norm=1, metric=1),
     "STARC, VAL, L infinity": STARC(norm=np.inf, metric=np.inf),
+    "STARC, VALPotential": STARC(ValueAdjustedLevelling(levelled=False)),
     "EPIC": EPIC(),
     "DARD": DARD(),
     "Spearman": Spearman(),
     "raw Pearson": Pearson(AsGiven()),
 }
+
+LEVELLED = ("STARC, VAL", "STARC, minimal norm", "STARC, VAL, L1", "STARC, VAL, L infinity")
+"""Those that are 0 for S'-redistribution too."""

@@ -98,6 +98,15 @@ def test_states_without_a_say_differ_in_the_papers_program():
     assert (found.low[0], found.high[0]) == pytest.approx((-1, 1))
 
 
+@pytest.mark.parametrize("l1", [1e-8, 5e-8, 1e-6, 1e-3])
+def test_a_small_price_on_the_norm_chooses_too(l1):
+    model = models.paper_grid()
+    found = optimal_face(model.mdp, model.expert, FiniteLP(margin_cap=0.1, l1=l1))
+    sparsest = optimal_face(model.mdp, model.expert, FiniteLP(margin_cap=0.1, l1=0.01))
+    assert found.unique
+    np.testing.assert_allclose(found.low, sparsest.low, atol=1e-6)
+
+
 @settings(max_examples=15)
 @given(models.models(), st.sampled_from([{}, {"l1": 0.05}, {"l1": "auto"}, {"margin_cap": 0.05}, {"margin_cap": None}]))
 def test_learned_reward_lies_on_the_face(model, options):
@@ -148,11 +157,18 @@ def test_record_is_json():
     assert len(found["width"]) == 4 and found["sparsest"]
 
 
+def test_record_is_json_when_the_learner_was_given_numpy_s_numbers(unchecked):
+    mdp, expert = twins()
+    found = optimal_face(mdp, expert, FiniteLP(r_max=np.int64(2), margin_cap=np.float32(0.1)))
+    assert json.loads(json.dumps(found.to_json()))["r_max"] == 2.0
+
+
 @pytest.mark.parametrize("options, message", [
     ({"learner": FiniteLP(slack=10.0)}, "slack is 10"),
     ({"learner": "FiniteLP"}, "learner is a str"),
     ({"tolerance": 0.0}, "tolerance is 0"),
     ({"workers": 0}, "workers is 0"),
+    ({"learner": FiniteLP(margin_cap=0.1, l1=1e-9)}, "l1 is 1e-09: expected 0 or at least 1e-08"),
     ({"expert": np.array([[1, 0], [1, 0], [np.nan, np.nan], [1, 0]])}, "in 1 reachable states, such as 2"),
 ])  # fmt: skip
 def test_bad_options_are_named(unchecked, options, message):

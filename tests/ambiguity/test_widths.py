@@ -242,3 +242,17 @@ def test_bad_problem_is_named(unchecked, mdp, expert, error):
     model = models.paper_grid()
     with pytest.raises(error):
         feasible_widths(mdp or model.mdp, model.expert if expert is None else expert)
+
+
+def test_record_is_json_when_given_numpy_s_numbers(unchecked):
+    model = models.paper_grid()
+    found = feasible_widths(model.mdp, model.expert, r_max=np.int64(2))
+    assert json.loads(json.dumps(found.to_json()))["r_max"] == 2.0
+
+
+def test_no_step_is_ever_taken_where_every_start_is_terminal():
+    ended = TabularMDP.from_dense(np.zeros((2, 2, 2)), 0.9, [1.0, 0.0])
+    found = feasible_widths(ended, np.zeros(2, dtype=int), margin=None, reward_on="state-action")
+    assert str(found).startswith("No widths: every state that is reached is terminal")
+    with pytest.raises(DegenerateExpert, match="every start is terminal"):
+        feasible_widths(ended, np.zeros(2, dtype=int))

@@ -7,6 +7,7 @@ from models import ring
 from irl_gym.distances import epic
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.random_rewards import random_mdp
+from irl_gym.mdp import TabularMDP
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -29,6 +30,23 @@ def test_K_is_1_over_the_coverage_of_a_certain_transition():
     mdp = ring([[1, 1], [0, 0]])
     found = epic_bound(mdp, np.array([0.0, 1.0]), np.arange(8.0).reshape(2, 2, 2) ** 2)
     assert found.K == pytest.approx(4.0)  # each of 2 states half of the time: 0.5 / (1 / 8)
+
+
+def test_K_counts_every_time_step_not_the_first_alone():
+    """From any of 4 states to state 0: at first each transition has a quarter, later one is certain."""
+    P = np.zeros((4, 2, 4))
+    P[:, :, 0] = 1.0
+    found = epic_bound(TabularMDP.from_dense(P, 0.9, np.full(4, 0.25)), np.arange(4.0), np.arange(8.0).reshape(4, 2) ** 2)
+    assert found.K == pytest.approx(32.0)  # 1 / (1 / 32)
+
+
+def test_the_sharper_bound_is_the_deviation_of_the_canonical_reward():
+    mdp = random_mdp(np.random.default_rng(2), 5, 2, 0.8)
+    R, other = np.random.default_rng(3).normal(size=(2, 5, 2, 5))
+    mean = R.mean(axis=(1, 2))
+    canonical = R + 0.8 * mean - mean[:, None, None] - 0.8 * mean.mean()
+    found = epic_bound(mdp, R, other)
+    assert found.sharper == pytest.approx(4 * found.K * canonical.std() * found.distance / (1 - 0.8))
 
 
 def test_the_bound_is_that_of_the_theorem():

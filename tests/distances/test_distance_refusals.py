@@ -117,7 +117,7 @@ def test_something_else_than_a_table_is_refused(call, unchecked):
 
 
 @pytest.mark.parametrize("distance", [starc, pearson, spearman])
-@pytest.mark.parametrize("wrong", ["VAL", MinimalNorm, EPIC()])
+@pytest.mark.parametrize("wrong", ["VAL", MinimalNorm, EPIC(), 0, ""])
 def test_something_else_than_a_canonical_form_is_refused(distance, wrong, unchecked):
     with pytest.raises(InvalidParameter, match=r"canonical is .*: expected a canonical form, such as `MinimalNorm\(\)`"):
         distance(MDP, R, -R, canonical=wrong)
@@ -127,6 +127,20 @@ def test_something_else_than_a_canonical_form_is_refused(distance, wrong, unchec
 def test_a_matrix_is_of_a_record(wrong, unchecked):
     with pytest.raises(InvalidParameter, match=r"expected a record, such as `EPIC\(\)`"):
         distance_matrix(wrong, MDP, [R, -R])
+
+
+@pytest.mark.parametrize("nothing", [[], {}])
+def test_a_matrix_of_no_rewards_is_refused(nothing):
+    with pytest.raises(InvalidReward, match="rewards is empty"):
+        distance_matrix(EPIC(), MDP, nothing)
+
+
+@pytest.mark.parametrize("distance", [epic, dard, starc, spearman])
+def test_a_reward_whose_sums_overflow_is_refused(distance):
+    with pytest.raises(
+        InvalidReward, match=r"the second reward is 1e\+305 at \[0\]: a reward is a finite number, 1e\+300 at most"
+    ):
+        distance(MDP, R, np.full(6, 1e305))
 
 
 def test_a_matrix_is_of_several_rewards(unchecked):

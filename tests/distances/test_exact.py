@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from models import models, random_model
+from scipy.stats import spearmanr
 
 from irl_gym.distances import (
     DARD,
@@ -24,10 +25,11 @@ from irl_gym.distances import (
 )
 from irl_gym.distances.canonical import FreshDraws, ModelDraws
 from irl_gym.distances.coverage import coverage_of
-from irl_gym.distances.gridworlds import gridworld, gridworld_rewards
+from irl_gym.distances.gridworlds import gridworld, gridworld_rewards, other_than_printed
 from irl_gym.distances.payments import payments
 from irl_gym.distances.random_rewards import redistributed, shaped
 from irl_gym.dynamic_programming import occupancy
+from irl_gym.errors import UndefinedDistance
 from irl_gym.rewards import TabularReward
 
 LEVELLED = {
@@ -118,16 +120,20 @@ def test_minimal_norm_is_the_least_squares_solution(levelled):
     np.testing.assert_allclose(values, least.reshape(4, 2)[s, coverage.actions] if levelled else least, atol=1e-10)
 
 
-def test_epic_gridworlds_have_the_distances_of_the_figure():
-    found = distance_matrix(EPIC(), gridworld(), gridworld_rewards())
-    np.testing.assert_allclose(found[0, [1, 2, 4]], [0.0, 0.7500, 0.1602], atol=5e-5)
+def test_epic_gridworlds_have_the_distances_that_the_paper_prints():
+    matrix = distance_matrix(EPIC(), gridworld(), gridworld_rewards())
+    assert other_than_printed(matrix) == []
+    assert other_than_printed(matrix + 1e-3)[0] == "Sparse-Dense is 0.0010: the paper prints 0.0000"
 
 
-def test_epic_gridworlds_path_and_cliff_have_the_distance_of_figure_2():
-    """0.27, by the caption; the four decimals here are this table's own."""
-    found = distance_matrix(EPIC(), gridworld(), gridworld_rewards())
-    assert round(found[4, 5], 2) == 0.27
-    np.testing.assert_allclose(found[[0, 3, 4], [5, 2, 5]], [0.3676, 0.6614, 0.2672], atol=5e-5)
+def test_epic_gridworlds_have_the_distances_of_the_formula():
+    """All pairs of the figure to four decimals, from definition 4.1 written out: D uniform over states and actions."""
+    mdp, rewards = gridworld(), gridworld_rewards()
+    P = mdp.P.toarray().reshape(9, 5, 9)
+    found = np.array([(naive_epic(P, R, 0.99) * P).sum(axis=2).ravel() for R in rewards.values()])  # s' is certain
+    np.testing.assert_allclose(
+        distance_matrix(EPIC(), mdp, rewards), np.sqrt(np.clip(1 - np.corrcoef(found), 0, 2) / 2), atol=1e-7
+    )
 
 
 def test_opposite_rewards_are_1_apart():
@@ -231,3 +237,42 @@ def test_a_reward_that_no_policy_can_change_is_half_a_unit_from_others_with_star
 def test_a_tabular_reward_is_its_values():
     model = random_model(10)
     assert epic(model.mdp, TabularReward(model.R), model.R) == 0
+
+
+@given(seed=seeds, scale=st.sampled_from([1.0, 1e3, 1e11]))
+@pytest.mark.parametrize("distance", [*LEVELLED.values(), SHAPED["VAL, not levelled"], ALL["raw"]])
+def test_impossible_transitions_are_not_read(distance, seed, scale):
+    model = random_model(seed % 50, 6, 2, "terminal")
+    rng = np.random.default_rng(seed)
+    R, other = rng.normal(size=(2, 6, 2, 6))
+    changed = np.where(model.P > 0, R, scale * rng.normal(size=R.shape))
+    assert distance.distance(model.mdp, R, changed) < 1e-7
+    assert distance.distance(model.mdp, other, changed) == pytest.approx(distance.distance(model.mdp, other, R), abs=1e-7)
+
+
+@pytest.mark.parametrize("distance", [EPIC(), STARC(), STARC(MinimalNorm())])
+def test_steps_out_of_terminal_states_are_not_read(distance):
+    model = random_model(0, 6, 2, "terminal")
+    R, other = np.random.default_rng(0).normal(size=(2, 6, 2))
+    changed = np.where(model.mdp.terminal[:, None], 1e13, R)
+    assert distance.distance(model.mdp, R, changed) < 1e-7
+    assert distance.distance(model.mdp, other, changed) == pytest.approx(distance.distance(model.mdp, other, R), abs=1e-7)
+
+
+@pytest.mark.parametrize("change", [np.exp, lambda x: np.where(x == x.max(), 1e10, x), lambda x: x**3, np.copy])
+def test_spearman_of_raw_rewards_is_that_of_scipy(change):
+    model = random_model(0, 6, 4)
+    one, other = 30 * np.random.default_rng(0).random((2, 6, 4))
+    rho = spearmanr(one.ravel(), other.ravel()).statistic
+    distance = Spearman(AsGiven()).distance
+    assert distance(model.mdp, one, change(one)) == 0.0
+    assert distance(model.mdp, one, change(other)) == pytest.approx(np.sqrt((1 - rho) / 2))
+
+
+@pytest.mark.parametrize("distance", [EPIC(), Pearson(), Spearman(), DARD()])
+def test_a_potential_in_single_precision_has_no_correlation(distance):
+    model = random_model(0, 6, 2)
+    only = shaped(np.random.default_rng(0), model.mdp, np.zeros((6, 2, 6))).astype(np.float32)
+    with pytest.raises(UndefinedDistance, match="only a potential"):
+        distance.distance(model.mdp, only, model.R)
+    assert STARC().distance(model.mdp, only, model.R) == pytest.approx(0.5)

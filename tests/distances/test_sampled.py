@@ -55,9 +55,9 @@ def random_actions(observations, rng):
 def estimate(name, model, seed, a, b):
     transitions, fresh, rng = drawn(model, seed)
     if name == "pearson":
-        return sampled_pearson(a, b, transitions)
+        return sampled_pearson(a, b, transitions, None)
     if name == "spearman":
-        return sampled_spearman(a, b, transitions)
+        return sampled_spearman(a, b, transitions, None)
     if name == "epic":
         return sampled_epic(a, b, transitions, fresh)
     model = TableModel(model.mdp)
@@ -126,8 +126,8 @@ def test_steps_of_an_episode_count_as_a_group():
     once, _, _ = drawn(CONTINUING, 0, n=200)
     copies = np.repeat(np.arange(200), 10)
     parts = (once.observations[copies], once.actions[copies], once.next_observations[copies])
-    known = sampled_pearson(a, b, Transitions(*parts, groups=copies)).error
-    alone = sampled_pearson(a, b, once).error
+    known = sampled_pearson(a, b, Transitions(*parts, groups=copies), None).error
+    alone = sampled_pearson(a, b, once, None).error
     assert known == pytest.approx(alone, rel=1e-9)
 
 
@@ -181,7 +181,7 @@ def test_a_reward_seen_in_one_block_only_has_an_infinite_error():
     transitions, _, _ = drawn(CONTINUING, 0)
     rare = np.zeros(1000)
     rare[7] = 1.0
-    found = sampled_pearson(lambda *_: rare, lambda *_: rare + np.arange(1000.0), transitions)
+    found = sampled_pearson(lambda *_: rare, lambda *_: rare + np.arange(1000.0), transitions, None)
     assert found.error == np.inf
 
 
@@ -189,14 +189,14 @@ def test_a_reward_seen_in_one_block_only_has_an_infinite_error():
     ("returned", "said"),
     [
         (np.zeros(3), r"gives shape \(3,\) for 1000"),
-        (np.full(1000, np.nan), "gives nan for transition 0"),
+        (np.full(1000, np.nan), r"what the reward function returns is nan at \[0\]"),
         ("no", "cannot be read"),
     ],
 )
 def test_a_function_that_gives_no_numbers_is_refused(returned, said):
     transitions, _, _ = drawn(CONTINUING, 0)
     with pytest.raises(InvalidReward, match=said):
-        sampled_pearson(lambda *_: returned, lambda *_: returned, transitions)
+        sampled_pearson(lambda *_: returned, lambda *_: returned, transitions, None)
 
 
 def test_samples_that_do_not_fit_together_are_refused():
@@ -213,7 +213,7 @@ def test_samples_that_do_not_fit_together_are_refused():
 def test_one_group_has_no_error():
     a, b = map(function, rewards_of(CONTINUING))
     with pytest.raises(UndefinedDistance, match="all transitions are of one group"):
-        sampled_pearson(a, b, Transitions(np.arange(8), np.zeros(8, int), np.arange(8), groups=np.zeros(8, int)))
+        sampled_pearson(a, b, Transitions(np.arange(8), np.zeros(8, int), np.arange(8), groups=np.zeros(8, int)), None)
 
 
 def test_replicates_and_horizons_are_checked():
@@ -229,7 +229,7 @@ def test_replicates_and_horizons_are_checked():
 def test_a_table_is_no_function(unchecked):
     transitions, _, _ = drawn(CONTINUING, 0)
     with pytest.raises(InvalidReward, match=r"the reward is a ndarray: expected a function of \(observations, actions"):
-        sampled_pearson(CONTINUING.R, CONTINUING.R, transitions)
+        sampled_pearson(CONTINUING.R, CONTINUING.R, transitions, None)
 
 
 @pytest.mark.parametrize("wrong", [[0, 1, 2], None, 3, {"s": [0, 1, 2]}])
@@ -242,7 +242,7 @@ def test_something_else_than_a_sample_is_refused(unchecked):
     transitions, _, _ = drawn(CONTINUING, 0)
     a = function(CONTINUING.R)
     with pytest.raises(InvalidParameter, match=r"expected Transitions, such as `Transitions\.from_episodes"):
-        sampled_pearson(a, a, [0, 1])
+        sampled_pearson(a, a, [0, 1], None)
     with pytest.raises(InvalidParameter, match=r"expected FreshSample, such as `FreshSample\.from_transitions"):
         sampled_epic(a, a, transitions, None)
     with pytest.raises(InvalidDemonstrations, match="there is a str where an episode is expected"):
@@ -270,3 +270,68 @@ def test_a_policy_of_starc_is_a_function(unchecked):
     a = function(CONTINUING.R)
     with pytest.raises(InvalidParameter, match="policy is a ndarray: expected a function, such as `lambda"):
         sampled_starc(a, a, transitions, gamma=0.9, model=TableModel(CONTINUING.mdp), policy=np.zeros(8), horizon=3, rng=rng)
+
+
+def test_dard_draws_what_the_model_says_when_observations_are_whole_numbers():
+    """A model of real numbers, from data that happens to hold whole ones."""
+    rng = np.random.default_rng(0)
+    numbers, actions = rng.integers(10, size=(2, 400)), rng.integers(2, size=400)
+
+    def walk(observations, actions, rng):
+        return observations + 0.5 * actions - 0.3, np.zeros(len(actions), dtype=bool)
+
+    def measured(dtype):
+        transitions = Transitions(numbers[0].astype(dtype), actions, numbers[1].astype(dtype))
+        given = {"gamma": 0.9, "model": walk, "actions": np.arange(2), "rng": np.random.default_rng(1)}
+        return sampled_dard(lambda s, a, x: np.sin(5 * x), lambda s, a, x: np.sin(5 * x + s) + a, transitions, **given)
+
+    assert measured(int) == measured(float)
+
+
+@pytest.mark.parametrize("name", ["epic", "dard"])
+def test_a_potential_in_single_precision_has_no_distance(name):
+    R = rewards_of(CONTINUING)[0]
+    only = shaped(np.random.default_rng(0), CONTINUING.mdp, np.zeros((8, 3, 8))).astype(np.float32)
+    with pytest.raises(UndefinedDistance, match="only a potential"):
+        estimate(name, CONTINUING, 0, function(R), function(only))
+
+
+@pytest.mark.parametrize("rows", [1, 7, 1000])
+def test_how_many_transitions_are_evaluated_at_once_changes_nothing(rows, monkeypatch):
+    a, b = map(function, rewards_of(ENDING))
+    whole = estimate("epic", ENDING, 0, a, b)
+    monkeypatch.setattr("irl_gym.distances.sampled.ROWS", rows)
+    assert estimate("epic", ENDING, 0, a, b) == whole
+
+
+def test_few_fresh_draws_make_a_larger_error():
+    a, b = map(function, rewards_of(CONTINUING))
+    few, many = (drawn(CONTINUING, 0, n=4000, m=m) for m in (20, 2000))
+    errors = [sampled_epic(a, b, few[0], fresh).error for fresh in (few[1], many[1])]
+    assert errors[0] > 2 * errors[1]
+
+
+@pytest.mark.parametrize("part, wrong, said", [
+    ("terminated", np.zeros((8, 1), bool), r"terminated has shape \(8, 1\): expected \(8,\).*ravel"),
+    ("terminated", np.full(8, np.nan), "terminated holds nan: expected True and False"),
+    ("terminated", np.full(8, 2), "terminated holds 2: expected True and False"),
+    ("groups", np.zeros((8, 1), int), r"groups has shape \(8, 1\): expected \(8,\)"),
+])  # fmt: skip
+def test_flags_and_groups_are_one_for_each_transition(part, wrong, said, unchecked):
+    with pytest.raises(InvalidParameter, match=said):
+        Transitions(np.arange(8), np.zeros(8, int), np.arange(8), **{part: wrong})
+
+
+def test_flags_of_fresh_draws_are_one_for_each(unchecked):
+    with pytest.raises(InvalidParameter, match=r"terminal has shape \(8, 1\): expected \(8,\)"):
+        FreshSample(0.9, np.arange(8), np.zeros(8, int), np.zeros((8, 1)))
+    with pytest.raises(InvalidParameter, match="transitions is a list: expected Transitions"):
+        FreshSample.from_transitions([1, 2], 0.9, rng=np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("policy", [lambda observations, rng: (np.zeros(1000), None), lambda observations, rng: np.zeros(3)])
+def test_a_policy_of_starc_gives_an_action_for_each_observation(policy, unchecked):
+    transitions, _, rng = drawn(CONTINUING, 0)
+    a = function(rewards_of(CONTINUING)[0])
+    with pytest.raises(InvalidParameter, match=r"the policy gives a .*: expected an array with one action for each"):
+        sampled_starc(a, a, transitions, gamma=0.9, model=TableModel(CONTINUING.mdp), policy=policy, horizon=3, rng=rng)

@@ -32,6 +32,11 @@ def test_an_unknown_measurement_is_refused():
     assert run("--only", "everything").returncode != 0
 
 
+def test_nothing_to_measure_gets_one_clear_line():
+    made = run("--only")
+    assert made.returncode == 2 and "only is empty: expected some of figure" in made.stderr
+
+
 @pytest.mark.parametrize(("flag", "value"), [("--mdps", "0"), ("--pairs", "1"), ("--seed", "-1")])
 def test_numbers_that_cannot_be_measured_with_get_one_clear_line(flag, value):
     made = run("--only", "bound", flag, value)

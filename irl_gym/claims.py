@@ -20,12 +20,15 @@ from irl_gym.names import action_names
 from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.table_files import TABLE, UNDER_WAY
 
-FORMAT = "irl_gym.Run/1"
+NUMBER = 1
+FORMAT = f"irl_gym.Run/{NUMBER}"
 FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 """Stages of every version, after the table."""
 STAGES = (*FIRST, "record", "ambiguity", "report")
 """All stages after the table."""
 VERSION, ENVIRONMENT = "run.json", "environment.json"
+AGAIN = "runs/again"
+"""The folder of a run that is made again."""
 
 
 def claim(path: Path, config: dict[str, Any]) -> None:
@@ -61,8 +64,8 @@ def check_format(path: Path, told: Mapping[str, Any]) -> None:
     found = told.get("format")
     if not told or found == FORMAT:
         return
-    number = re.fullmatch(r"irl_gym\.Run/(\d+)", str(found))
-    if number is None:
+    number = re.fullmatch(r"irl_gym\.Run/([0-9]{1,9})", str(found))
+    if number is None or int(number[1]) <= NUMBER:
         raise RunConflict(f"{path / VERSION} has format {found!r}: expected {FORMAT!r}. Is it another program's?")
     raise RunNewer(
         f"{path} has format {found!r}, written by irl_gym {told.get('irl_gym')}: expected {FORMAT!r}, which is what irl_gym "
@@ -84,6 +87,23 @@ def write_environment(path: Path, env: gym.Env, env_id: str | None) -> None:
         observations = serialize_space(env.observation_space)  # text, as Minari keeps it: bounds may be infinite
         told = {"id": env_id, "observations": observations, "actions": [*action_names(env)]}
         write_json(path / ENVIRONMENT, told)
+
+
+def into_new_folder(command: Sequence[str]) -> list[str]:
+    """The command with another --out: in the run's own folder everything is there already, and would be kept."""
+    kept: list[str] = []
+    skipped = False
+    for word in map(str, command):
+        flag = flag_of(word)
+        if not skipped and flag != "--out":
+            kept.append(word)
+        skipped = flag == "--out" and "=" not in word
+    return [*kept, "--out", AGAIN]
+
+
+def flag_of(word: str) -> str:
+    """The flag that a word of a command gives, as --help spells it; tyro takes --env_id for --env-id."""
+    return word.partition("=")[0].replace("_", "-") if word.startswith("--") else ""
 
 
 def shell_command(command: Sequence[str] | None) -> str | None:

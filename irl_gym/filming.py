@@ -20,7 +20,7 @@ from PIL import Image, features
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import UnknownObservation
 from irl_gym.features import batch_of_one, take
-from irl_gym.films import Film, Moment
+from irl_gym.films import MOST_BYTES, Film, Moment
 from irl_gym.layouts import grid_shape
 from irl_gym.linear_reward import LinearReward
 from irl_gym.names import action_names, state_name
@@ -36,8 +36,6 @@ MOST_FRAMES = 60
 """Pictures of a film."""
 MOST_STEPS = 1000
 """Steps after which a film is cut."""
-MOST_BYTES = 700_000
-"""Of the pictures of a film; they are made smaller until they fit."""
 SIZES = ((320, 80), (320, 55), (240, 50), (160, 45), (96, 40))
 """Pixels of the longer side, and webp's quality: tried in this order."""
 

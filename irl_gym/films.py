@@ -9,9 +9,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from irl_gym.run_folder import read_json
+
 FORMAT = "irl_gym.Film/1"
 KINDS = ("webp", "png")
 """Formats of pictures."""
+MOST_BYTES = 700_000
+"""Of the pictures of a film: they are made smaller until they fit, and a page leaves out what is still too much."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def load_film(path: Path) -> Film:
     Raises:
         OSError, ValueError, KeyError, TypeError: a file is missing or holds something else.
     """
-    told: Any = json.loads(path.read_text())
+    told: Any = read_json(path)
     if told["format"] != FORMAT:
         raise ValueError(f"its format is {told['format']!r}: expected {FORMAT!r}")
     if told["kind"] not in KINDS:  # it is part of a file's name: else a stranger's run could name any file

@@ -219,8 +219,7 @@ class Loop:
         result = self._learn(self.experiment.learner)
         result.reward.save(folder / "reward.npz")
         write_json(folder / "certificate.json", result.certificate.to_json())
-        learner = type(self.experiment.learner).__name__
-        return {"learner": learner, "status": result.status.value, "objective": result.objective, "stats": dict(result.stats)}
+        return {"learner": type(self.experiment.learner).__name__, **result.record()}
 
     def _learn(self, learner: Learner) -> IRLResult:
         """Give a learner what it is of: a table and a policy, or a simulator and episodes."""

@@ -17,9 +17,10 @@ import numpy as np
 from irl_gym.intervals import Interval, iqm_interval
 from irl_gym.runs import Run
 
-SEED = ("seed",)
-PLACE = ("seed", "env_id", "env_kwargs", "dataset", "dataset_root", "table")
-"""Entries of a configuration: what pooled runs may differ in, and what pooled environments may."""
+PLACE = ("env_id", "env_kwargs", "dataset", "dataset_root", "table")
+"""Entries of a configuration in which pooled environments may differ."""
+PARTS = ("table", "expert", "learner", "inner", "retrain")
+"""Entries of a configuration that are objects, and may have a seed of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ def pools(named: Mapping[str, Run]) -> list[Pool]:
         named: runs by what they are called.
     """
     names, made = list(named), []
-    for group in _alike([run.config for run in named.values()], SEED):
+    for group in _alike([without_seeds(run.config) for run in named.values()]):
         seeds: dict[int, str] = {}
         for i in group:
             seeds.setdefault(named[names[i]].config["seed"], names[i])
@@ -85,7 +86,7 @@ def pools(named: Mapping[str, Run]) -> list[Pool]:
 def over_environments(found: Sequence[Pool]) -> list[tuple[list[Pool], Interval]]:
     """Pools that differ in their environment alone and have equally many seeds, with the stratified mean of their scores."""
     scored = [(pool, scores) for pool in found if (scores := pool.scores) is not None]
-    groups = _alike([{**pool.first.config, "n": scores.size} for pool, scores in scored], PLACE)
+    groups = _alike([_placeless(pool.first.config) | {"n": scores.size} for pool, scores in scored])
     return [
         ([scored[i][0] for i in group], over_seeds(np.stack([scored[i][1] for i in group])))
         for group in groups
@@ -93,10 +94,23 @@ def over_environments(found: Sequence[Pool]) -> list[tuple[list[Pool], Interval]
     ]
 
 
-def _alike(configs: Sequence[Mapping[str, Any]], but: Sequence[str]) -> list[list[int]]:
-    """The positions of configurations that are the same but for some entries."""
+def without_seeds(config: Mapping[str, Any]) -> dict[str, Any]:
+    """A configuration without its seed and those of its parts: the command line gives one seed to all of them."""
+    rest = {name: value for name, value in config.items() if name != "seed"}
+    for name in PARTS:
+        if isinstance(part := rest.get(name), Mapping):
+            rest[name] = {key: value for key, value in part.items() if key != "seed"}
+    return rest
+
+
+def _placeless(config: Mapping[str, Any]) -> dict[str, Any]:
+    """A configuration without seeds and environment."""
+    return {name: value for name, value in without_seeds(config).items() if name not in PLACE}
+
+
+def _alike(configs: Sequence[Mapping[str, Any]]) -> list[list[int]]:
+    """The positions of configurations that are the same."""
     found: dict[str, list[int]] = {}
     for i, config in enumerate(configs):
-        rest = {name: value for name, value in config.items() if name not in but}
-        found.setdefault(json.dumps(rest, sort_keys=True), []).append(i)
+        found.setdefault(json.dumps(config, sort_keys=True), []).append(i)
     return list(found.values())

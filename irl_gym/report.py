@@ -205,7 +205,9 @@ def _why_not(reward: Mapping[str, Any]) -> str:
         where = "1 state" if count == 1 else f"{count:,} states"
         return f"not in {where}, where another action is better by {reward['worst_violation']:.3g} at most"
     if "regret" in reward:
-        return f"no: the policy planned for it gains {reward['regret']:.3g} +- {reward['regret_error']:.2g} over the expert"
+        noise = reward["regret_error"]
+        give = ", and one episode tells no noise" if noise is None else f" +- {noise:.2g}"
+        return f"no: the policy planned for it gains {reward['regret']:.3g}{give} over the expert"
     return "NO: see certificate.json"
 
 

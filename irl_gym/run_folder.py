@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from irl_gym.errors import RunConflict
+from irl_gym.errors import InvalidParameter, RunConflict
 
 try:
     import fcntl
@@ -30,11 +30,28 @@ LOGS = "tensorboard"
 them loses no result, and no stage is run again."""
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write json with sorted keys, beside first and then renamed."""
+def write_text(path: Path, text: str) -> None:
+    """Write a file, beside first and then renamed; where that fails nothing is left beside.
+
+    Raises:
+        InvalidParameter: there is a folder of the file's own name.
+        OSError: the system refused.
+    """
+    if path.is_dir():
+        raise InvalidParameter(f"{path} is a folder: expected a file, or nothing yet. Move it away, or write elsewhere.")
     beside = path.with_name(f".{path.name}.tmp")
-    beside.write_text(json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n")
-    beside.replace(path)
+    try:
+        beside.write_text(text, encoding="utf-8", newline="\n")
+        beside.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+        raise
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write json with sorted keys; errors as `write_text`."""
+    write_text(path, json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -43,7 +60,10 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         ValueError: it is something else.
     """
-    content = json.loads(path.read_text())
+    try:
+        content = json.loads(path.read_text())
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
     if not isinstance(content, dict) or not content:
         raise ValueError(f"expected an object with something in it, found {content!r:.40}")
     return content
@@ -80,13 +100,12 @@ class RunFolder:
     def _compare(self, known: Path, wanted: dict[str, Any]) -> None:
         try:
             found = json.loads(known.read_text())
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            before = dict(_leaves(found)) if isinstance(found, dict) else {}
+        except (OSError, ValueError, RecursionError) as error:
             raise RunConflict(
                 f"{known} is not json ({error}): expected a run's configuration. Choose another --out."
             ) from error
-        if not isinstance(found, dict):
-            found = {}
-        before, now = dict(_leaves(found)), dict(_leaves(wanted))
+        now = dict(_leaves(wanted))
         changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
         if before and changed and not any((self.path / RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
             with self._alone():
@@ -111,7 +130,7 @@ class RunFolder:
         try:
             record = json.loads(self._record(stage).read_text())
             whole = all((self.path / name).exists() for name in record["files"])
-        except (OSError, ValueError, TypeError, KeyError):
+        except (OSError, ValueError, TypeError, KeyError, RecursionError):
             return None
         return record if whole else None
 

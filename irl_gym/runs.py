@@ -16,7 +16,7 @@ from gymnasium import spaces
 from minari.serialization import deserialize_space
 
 from irl_gym.choices import environment_of
-from irl_gym.claims import FIRST, STAGES, check_format, shell_command
+from irl_gym.claims import AGAIN, FIRST, STAGES, check_format, into_new_folder, shell_command
 from irl_gym.curves import Curve, read_curve
 from irl_gym.discretize import discretize
 from irl_gym.errors import IrlGymError, RunIncomplete
@@ -28,6 +28,11 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+
+SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
+"""What is raised by content that no run leaves."""
+ONCE = ("config.json", "run.json")
+"""Files that no stage writes: they are there from the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +86,7 @@ class Run:
 
     @property
     def command(self) -> str | None:
-        """The command that reproduces the run, for a shell; None where it was started from Python."""
+        """The command that reproduces the run, for a shell; None where it was started from Python, or nobody noted it."""
         return shell_command(self.version.get("command"))
 
     def state_name(self, row: int) -> str:
@@ -156,12 +161,17 @@ def understood(*paths: str | os.PathLike) -> Iterator[None]:
         yield
     except IrlGymError:
         raise
-    except (ArithmeticError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        told = ", ".join(map(str, paths))
-        raise RunIncomplete(
-            f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. They were "
-            "changed, or another program wrote them; make the run again."
-        ) from error
+    except SURPRISES as error:
+        raise not_understood(error, *paths) from error
+
+
+def not_understood(error: Exception, *paths: str | os.PathLike) -> RunIncomplete:
+    """The error of folders whose files can be read and say what no run says."""
+    told = ", ".join(map(str, paths))
+    return RunIncomplete(
+        f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. They were "
+        "changed, or another program wrote them; make the run again."
+    )
 
 
 class _Reader:
@@ -177,6 +187,15 @@ class _Reader:
             f"{self.path} is incomplete: {what}: expected a finished run. The same command continues it: {again}"
         )
 
+    def lost(self, what: str) -> RunIncomplete:
+        """The error of a run that cannot be continued, since what says which run it is is gone."""
+        again = shell_command(None if self.command is None else into_new_folder(self.command))
+        told = f"with another --out: {again}" if again else f"in a new folder: recover_and_retrain(experiment, {AGAIN!r})"
+        return RunIncomplete(
+            f"{self.path} is damaged: {what}: expected what the run wrote at its start, which no stage writes again. Make the "
+            f"run again, {told}"
+        )
+
     def read(self, name: str, read: Callable[[Path], Any]) -> Any:
         """The content of a file."""
         try:
@@ -185,10 +204,11 @@ class _Reader:
             missing = Path(error.filename or name)
             told = missing.relative_to(self.path) if missing.is_relative_to(self.path) else name
             raise self.incomplete(f"{told} is missing") from error
-        except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, IrlGymError) as error:
-            raise self.incomplete(
-                f"{name} cannot be read ({type(error).__name__}: {error}); delete it, and its stage is run again"
-            ) from error
+        except (OSError, *SURPRISES, EOFError, zipfile.BadZipFile, IrlGymError) as error:
+            what = f"{name} cannot be read ({type(error).__name__}: {error})"
+            if name in ONCE:
+                raise self.lost(what) from error
+            raise self.incomplete(f"{what}; delete it, and its stage is run again") from error
 
     def maybe(self, name: str, read: Callable[[Path], Any]) -> Any:
         """The content of a file that not every run has."""

@@ -14,8 +14,10 @@ from rich.text import Text
 
 from irl_gym import IrlGymError
 from irl_gym.errors import InvalidParameter
-from irl_gym.page.comparison import write_comparison
-from irl_gym.runs import read_run, understood
+from irl_gym.page.comparison import lettered, write_comparison
+from irl_gym.page.pooled import told
+from irl_gym.pooling import pools
+from irl_gym.runs import Run, read_run, understood
 from irl_gym.terminal import check_writable, print_error
 
 
@@ -35,13 +37,24 @@ def main(arguments: Arguments) -> int:
         if len(arguments.runs) == 1:
             raise InvalidParameter(f"runs has 1 folder, {arguments.runs[0]}: expected two or more to put side by side.")
         check_writable(arguments.out)
+        runs = [_read(folder) for folder in arguments.runs]
         with understood(*arguments.runs):
-            write_comparison([read_run(one) for one in arguments.runs], arguments.out)
+            write_comparison(runs, arguments.out)
+            together = [told(pool) for pool in pools(lettered(runs))]
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
-    Console(soft_wrap=True).print(Text(f"Wrote {arguments.out}: {len(arguments.runs)} runs side by side."))
+    console = Console(soft_wrap=True)
+    for line in together:
+        console.print(Text(line))
+    console.print(Text(f"Wrote {arguments.out}: {len(runs)} runs side by side."))
     return 0
+
+
+def _read(folder: Path) -> Run:
+    """One run; what is wrong with it names it alone."""
+    with understood(folder):
+        return read_run(folder)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
-from irl_gym.diagnoses.spoken import flags_of, with_names
+from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
 from irl_gym.errors import RunIncomplete
 from irl_gym.runs import Run, read_run, understood
@@ -42,7 +42,7 @@ def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
         sentence = with_names(one.sentence, run.state_name, run.actions) if run is not None and known else one.sentence
         console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {sentence}"))
         console.print(Text.assemble(("   Mend: ", "bold"), one.mend))
-        flags = flags_of(one.mend, given=run is not None and run.config.get("dataset") is not None)
+        flags = usable_flags(one.flags, given=run is not None and run.config.get("dataset") is not None)
         if flags:
             console.print(Text.assemble(("   Flags: ", "bold"), ", ".join(flags)))
 
@@ -52,7 +52,7 @@ def left(path: Path) -> Diagnosis | None:
     try:
         with understood(path):
             return diagnose_unfinished(path)
-    except IrlGymError:
+    except (IrlGymError, OSError):
         return None
 
 
@@ -63,7 +63,7 @@ def main(arguments: Arguments) -> int:
         with understood(arguments.run):
             run = read_run(arguments.run)
             diagnosis = diagnose_run(run)
-    except IrlGymError as error:
+    except (IrlGymError, OSError) as error:
         unfinished = error
         diagnosis = left(arguments.run) if isinstance(error, RunIncomplete) else None
         print_error(error)

@@ -29,7 +29,7 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
         return 130
-    except IrlGymError as error:
+    except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
     print_report(report, console)

@@ -62,6 +62,10 @@ def test_a_diagnosis_is_json():
     assert json.loads(json.dumps(made, allow_nan=False)) == made and made["findings"][0]["states"]
 
 
+def test_a_finding_keeps_the_flags_of_its_mend():
+    assert Finding("name", "This.", "That.", flags=("--l1 0",)).to_json()["flags"] == ["--l1 0"]
+
+
 def test_long_lists_of_states_are_cut_and_counted():
     made = doctor(judged(GRID.mdp, GRID.expert, -GRID.R), GRID.mdp, GRID.expert)
     assert " more" in made.findings[0].sentence

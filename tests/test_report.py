@@ -24,6 +24,7 @@ def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, 
         "duality_gap": 0.0, "least_l1_norm": 3.0, "l1_norm": 3.0, "marginless_states": 0, "violated_states": 0,
         "inseparable_states": 0, "zero": False, "reward_on": "state",
     } | reward  # fmt: skip
+    told = {key: one for key, one in told.items() if key != "violated_states" or one is not None}
     metrics = {
         "policies": {name: row for name in ("expert", "random", "retrained")}, "score_reason": reason, "reward": told,
         "training": training or {"environment_steps": 4096, "steps_to_0.9": 64, "steps_to_0.99": 2048}, "table": {
@@ -70,6 +71,14 @@ def test_states_it_cannot_settle_are_mended_only_when_something_is_lost(tmp_path
 @pytest.mark.parametrize(("gap", "words"), [(0.0, "none"), (1e-15, "none"), (1e-8, "at most 1.0e-08")])
 def test_a_gap_of_nothing_is_none(tmp_path, gap, words):
     assert f"margins short of the most by │ {words}" in said(tmp_path, duality_gap=gap)
+
+
+@pytest.mark.parametrize("error, words", [(0.25, "gains 0.5 +- 0.25"), (None, "gains 0.5, and one episode tells no noise")])
+def test_an_expert_that_is_beaten_is_told_with_the_noise(tmp_path, error, words):
+    proof = {"regret": 0.5, "regret_error": error, "distance": 1.0, "distance_error": error, "fell_short": False}
+    rounds = {"n_features": 16, "best_round": 1, "rounds": 2, "horizon": 9, "truncation": 0.1}
+    text = said(tmp_path, learner="TrajectoryLP", expert_optimal=False, violated_states=None, **proof, **rounds)
+    assert words in text
 
 
 def test_a_healthy_run_does_not_mention_the_doctor(tmp_path):

@@ -2,11 +2,12 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
-from irl_gym.errors import RunConflict
-from irl_gym.run_folder import LOGS, RunFolder, read_json
+from irl_gym.errors import InvalidParameter, RunConflict
+from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json, write_text
 
 CONFIG = {"env_id": "A-v0", "seed": 1}
 
@@ -173,3 +174,49 @@ def test_read_json_refuses_what_is_no_object(folder, content):
     (folder.path / "metrics.json").write_text(content)
     with pytest.raises(RunConflict, match=r"metrics\.json cannot be read"):
         folder.load("metrics.json", read_json)
+
+
+@pytest.mark.parametrize("content", ["[" * 100_000, '{"a":' * 100_000])
+def test_json_that_is_nested_too_deeply_is_refused_like_other_damage(tmp_path, content):
+    (tmp_path / "deep.json").write_text(content)
+    with pytest.raises(ValueError, match="nested too deeply"):
+        read_json(tmp_path / "deep.json")
+    (tmp_path / "config.json").write_text(content)
+    with pytest.raises(RunConflict, match="Choose another --out"):
+        RunFolder(tmp_path, CONFIG)
+
+
+def test_a_stage_whose_record_is_nested_too_deeply_is_run_again(folder):
+    folder.run("one", writing("x"))
+    (folder.path / ".stages" / "one.json").write_text("[" * 100_000)
+    assert folder.run("one", writing("y"))["content"] == "y"
+
+
+def test_a_folder_in_place_of_a_configuration_is_refused(tmp_path):
+    (tmp_path / "config.json").mkdir()
+    with pytest.raises(RunConflict, match="Choose another --out"):
+        RunFolder(tmp_path, CONFIG)
+
+
+def test_a_file_that_cannot_be_renamed_leaves_nothing_beside(tmp_path, monkeypatch):
+    def refused(self, target):
+        raise PermissionError(13, "Permission denied", str(target))
+
+    monkeypatch.setattr(Path, "replace", refused)
+    with pytest.raises(PermissionError):
+        write_json(tmp_path / "a.json", {"a": 1})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_beside_and_the_old_one_in_place(tmp_path):
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(UnicodeEncodeError):
+        write_text(tmp_path / "a.txt", "\ud800")
+    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_a_folder_of_the_files_own_name_is_refused(tmp_path):
+    (tmp_path / "a.json").mkdir()
+    with pytest.raises(InvalidParameter, match=r"a\.json is a folder: expected a file"):
+        write_json(tmp_path / "a.json", {"a": 1})
+    assert [one.name for one in tmp_path.iterdir()] == ["a.json"]

@@ -10,7 +10,7 @@ import pytest
 from tiny_env import TableEnv, lottery
 
 from irl_gym.curves import Curve, read_curve, sampled_returns, write_curve
-from irl_gym.errors import RunIncomplete, RunNewer
+from irl_gym.errors import RunConflict, RunIncomplete, RunNewer
 from irl_gym.experiment import Experiment
 from irl_gym.layouts import grid_layout
 from irl_gym.loop import Loop
@@ -19,7 +19,7 @@ from irl_gym.names import action_names, state_name
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
 from irl_gym.run_folder import read_json, write_json
-from irl_gym.runs import read_run
+from irl_gym.runs import read_run, understood
 
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
@@ -148,6 +148,31 @@ def test_a_run_with_a_damaged_file_is_incomplete_by_name(copied, name):
         read_run(copied)
 
 
+@pytest.mark.parametrize("name", ["config.json", "run.json"])
+def test_a_run_whose_start_is_damaged_is_to_be_made_again_in_a_new_folder(copied, name):
+    (copied / name).write_text("{")
+    with pytest.raises(RunIncomplete, match=rf"{name} cannot be read") as told:
+        read_run(copied)
+    words = str(told.value)
+    assert "delete it" not in words and "no stage writes again. Make the run again" in words and "runs/again" in words
+    assert "a folder" not in words  # where the damaged run is
+
+
+@pytest.mark.parametrize("name", ["config.json", "run.json", "metrics.json", "environment.json", "films/agent.json"])
+def test_json_that_is_nested_too_deeply_is_damage(copied, name):
+    (copied / name).write_text("[" * 100_000)
+    with pytest.raises(RunIncomplete, match=rf"{name} cannot be read.*nested too deeply"):
+        read_run(copied)
+
+
+def test_content_that_is_nested_too_deeply_is_not_understood():
+    def endless(n):
+        return endless(n + 1)
+
+    with pytest.raises(RunIncomplete, match=r"theirs cannot be understood \(RecursionError"), understood("theirs"):
+        endless(0)
+
+
 def test_a_run_that_was_killed_is_incomplete_by_its_stage(tmp_path):
     loop = Loop(asked(), tmp_path, command=COMMAND)
     loop.stage("expert")
@@ -171,6 +196,13 @@ def test_a_run_of_a_newer_version_asks_for_an_upgrade(copied, read):
     write_json(copied / "run.json", {"format": "irl_gym.Run/2", "irl_gym": "9.0.0", "command": None})
     with pytest.raises(RunNewer, match=r"written by irl_gym 9\.0\.0: expected 'irl_gym\.Run/1'.*Upgrade"):
         read(copied)
+
+
+@pytest.mark.parametrize("told", ["irl_gym.Run/0", "irl_gym.Run/01", "irl_gym.Run/x", "another.Run/2", 7])
+def test_a_format_that_is_no_newer_one_is_refused_without_an_upgrade(copied, told):
+    write_json(copied / "run.json", {"format": told, "irl_gym": "0.0.1", "command": None})
+    with pytest.raises(RunConflict, match=r"has format .*: expected 'irl_gym\.Run/1'"):
+        read_run(copied)
 
 
 # --- runs of earlier versions ---

@@ -21,7 +21,7 @@ from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import TIE_TOLERANCE, tie_tolerance
+from irl_gym.metrics import TIE_TOLERANCE, Tie, tie_tolerance, worst_tie
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 
@@ -148,6 +148,21 @@ class Case:
         """(S, A) actions that are greedy under R. Ask only where there is a reward in a table."""
         assert self.optimum is not None
         return tied(self.optimum.Q, TIE_TOLERANCE * self.scale)
+
+    @cached_property
+    def continued(self) -> Matrix | None:
+        """(S, A) the expert where it is known, and the best under the true reward elsewhere; None where that is not known."""
+        if self.mdp is None or self.true_optimum is None:
+            return None
+        best = np.eye(self.mdp.n_actions)[self.true_optimum.policy]
+        return best if self.expert is None else np.where(self.known[:, None], self.distribution, best)
+
+    @cached_property
+    def worst(self) -> Tie | None:
+        """The worst policy under the true reward among those greedy under R; None where there is no such reward."""
+        if self.mdp is None or self.reward is None or self.true is None:
+            return None
+        return worst_tie(self.mdp, self.reward, self.true)
 
     @cached_property
     def true_tie(self) -> float:

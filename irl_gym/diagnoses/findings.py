@@ -25,6 +25,9 @@ class Finding:
     """(k,) rows of the table that it is about; none where it is about all of it."""
     actions: tuple[int, ...] = ()
     """k actions, one for each of the states, which are repeated where several actions are meant; or none."""
+    flags: tuple[str, ...] = ()
+    """What the mend, the first where there are several, is on the command line of scripts/recover_and_retrain.py: flags that go
+    together, such as "--l1 0"; without a value where that is the reader's to choose, such as "--episodes". Or none."""
 
     def to_json(self) -> dict[str, Any]:
         """As json holds it."""
@@ -34,6 +37,7 @@ class Finding:
             "mend": self.mend,
             "states": self.states.tolist(),
             "actions": list(self.actions),
+            "flags": list(self.flags),
         }
 
 

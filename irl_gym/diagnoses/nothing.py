@@ -4,6 +4,7 @@ import numpy as np
 
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding, counted, named
+from irl_gym.diagnoses.mends import DEFAULTS, on_steps
 from irl_gym.errors import DegenerateExpert, IrlGymError
 
 
@@ -27,6 +28,7 @@ def lambda_above_lambda_0(case: Case) -> Finding | None:
         "lambda-above-lambda-0",
         f"The reward is zero because it is too dear: l1 is {l1:.6g}, and above lambda_0 no reward is worth its price.{known}",
         f'l1="auto", just below lambda_0{number}; l1=0.0 for the simplest reward with full margins.',
+        flags=("--l1 auto",),
     )
 
 
@@ -36,11 +38,13 @@ def zero_weights(case: Case) -> Finding | None:
         return None
     l1, rank, K = case.claims.get("l1") or 0.0, case.claims["rank"], case.claims["n_features"]
     if l1 > 0:
-        why, mend = f"its price l1 is {l1:.6g}, above what any reward is worth", "l1=0.0 first; then raise it slowly."
+        why = f"its price l1 is {l1:.6g}, above what any reward is worth"
+        mend, flags = "l1=0.0 first; then raise it slowly.", ("--l1 0",)
     else:
+        flags = ("--features",)
         why = f"no reward in the span of the {counted(K, 'feature')} is worth more than none; their rows have rank {rank}"
         mend = "Give features that differ between what follows the expert's actions and what follows others."
-    return Finding("zero-weights", f"The reward is zero: {why}.", mend)
+    return Finding("zero-weights", f"The reward is zero: {why}.", mend, flags=flags)
 
 
 def nothing_to_compare(case: Case) -> Finding | None:
@@ -48,7 +52,7 @@ def nothing_to_compare(case: Case) -> Finding | None:
     rows = case.rows
     if rows is None or case.mdp is None or rows.usable.any() or not case.judges_states:
         return None
-    count = counted(int((case.known & case.acting).sum()))
+    count, flags = counted(int((case.known & case.acting).sum())), ()
     if case.mdp.n_actions == 1:
         sentence, mend = "There is only one action: every reward makes the expert optimal.", "A world in which to choose."
     elif rows.equal.all():
@@ -62,7 +66,8 @@ def nothing_to_compare(case: Case) -> Finding | None:
     else:
         sentence = f"In all {count} where the expert is known, every action that it leaves out has the successors of its own."
         mend = 'reward_on="state-action": a reward on states is paid for where an action leads.'
-    return Finding("nothing-to-compare", sentence, mend)
+        flags = on_steps(case)
+    return Finding("nothing-to-compare", sentence, mend, flags=flags)
 
 
 def unexplained_expert(case: Case) -> Finding | None:
@@ -73,13 +78,17 @@ def unexplained_expert(case: Case) -> Finding | None:
     if not isinstance(case.best, DegenerateExpert):
         return None
     count, kind = counted(int((case.known & case.acting).sum())), "state reward" if case.on_states else "reward"
+    mend, flags = "Leave out the actions that it takes by mistake.", ()
+    if case.on_states:
+        mend, flags = 'reward_on="state-action" explains every expert', on_steps(case)
+        errs = "" if case.claims.get("slack") else "; or slack=10.0, which finds the states in which it contradicts itself"
+        mend = f"{mend}{errs}."
     return Finding(
         "unexplained-expert",
         f"No {kind} explains this expert: over the {count} where it is known, (4) holds only with every margin 0, so it is "
         "optimal for a reward only if that ties it with everything. Is it optimal for any reward at all, at this gamma?",
-        'reward_on="state-action" explains every expert; or slack=10.0, which finds the states in which it contradicts itself.'
-        if case.on_states
-        else "Leave out the actions that it takes by mistake.",
+        mend,
+        flags=flags,
     )
 
 
@@ -107,7 +116,8 @@ def zero_reward(case: Case) -> Finding | None:
     if isinstance(found, DegenerateExpert) or nothing_to_compare(case):
         return None
     mend = "FiniteLP() with its defaults finds a reward that prefers the expert's actions." if found else "Learn it again."
-    return Finding("zero-reward", "The reward is zero in every reachable state, and no price of ||R||_1 explains it.", mend)
+    told = "The reward is zero in every reachable state, and no price of ||R||_1 explains it."
+    return Finding("zero-reward", told, mend, flags=DEFAULTS if found else ())
 
 
 def constant_reward(case: Case) -> Finding | None:
@@ -128,4 +138,5 @@ def constant_reward(case: Case) -> Finding | None:
         "flat-reward",
         f"The reward {what}, and {where}: every policy collects the same, so nothing is preferred.",
         "FiniteLP() with its defaults, whose margins are above 0 wherever a reward can have any.",
+        flags=DEFAULTS,
     )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from irl_gym.diagnoses.case import Case
-from irl_gym.diagnoses.findings import Finding
+from irl_gym.diagnoses.findings import Finding, counted
 
 
 def inexpressible(case: Case) -> Finding | None:
@@ -16,6 +16,7 @@ def inexpressible(case: Case) -> Finding | None:
         f"No reward in the span of the features makes the expert optimal in the {states:,} states of the sample, but those "
         f"that tie it with everything: {K:,} features, of which the rows see {rank:,} directions.",
         "More or other features, one a state (OneHot) where the table is small; or FiniteLP, which needs none.",
+        flags=("--features",),
     )
 
 
@@ -33,9 +34,14 @@ def noisy_rows(case: Case) -> Finding | None:
     )
 
 
+def _noiseless(case: Case) -> bool:
+    """Are there values of which no error is known, as a single episode has none?"""
+    return case.claims.get("regret_error") is None or None in case.claims.get("gap_errors", ())
+
+
 def fell_short(case: Case) -> Finding | None:
     """The planned policy is worse than the expert under the very reward that it was planned for: planning failed."""
-    if "regret" not in case.claims or case.claims.get("zero"):
+    if "regret" not in case.claims or case.claims.get("zero") or _noiseless(case):
         return None
     regret, error = case.claims["regret"], case.claims["regret_error"]
     if regret >= -2 * error - 1e-9:
@@ -45,12 +51,20 @@ def fell_short(case: Case) -> Finding | None:
         f"The policy planned for the reward earns {-regret:.3g} less than the expert under that reward, standard error "
         f"{error:.2g}: the planner fell short, so what it says of the reward is too little.",
         "A stronger `inner` planner: more total_timesteps, or ValueIteration() where there is a table.",
+        flags=_stronger(case),
     )
+
+
+def _stronger(case: Case) -> tuple[str, ...]:
+    """The flags of a stronger inner planner; none where it is exact already."""
+    if case.stats.get("inner") == "ValueIteration":
+        return ()
+    return ("--total-timesteps",) if case.mdp is None else ("--inner value-iteration",)
 
 
 def beaten(case: Case) -> Finding | None:
     """(12) V^pi* >= V^pi_k: a policy that beats the expert under R shows that R is not yet the expert's."""
-    if "regret" not in case.claims or case.claims.get("zero"):
+    if "regret" not in case.claims or case.claims.get("zero") or _noiseless(case):
         return None
     regret, error = case.claims["regret"], case.claims["regret_error"]
     worst = min(zip(case.claims["gaps"], case.claims["gap_errors"], strict=True), key=lambda one: one[0] + 2 * one[1])
@@ -64,21 +78,26 @@ def beaten(case: Case) -> Finding | None:
         "expert-beaten",
         f"The expert is not best under the reward: {told}.",
         "More rounds (max_rounds, patience), or richer features; if the expert errs, nothing.",
+        flags=("--rounds",),
     )
 
 
 def drowned(case: Case) -> Finding | None:
     """Gaps within two standard errors cannot be told from none: too few trajectories."""
     gaps, errors = case.claims.get("gaps"), case.claims.get("gap_errors")
-    if gaps is None or errors is None or case.claims.get("zero") or any(g > 2 * e for g, e in zip(gaps, errors, strict=True)):
+    if gaps is None or errors is None or case.claims.get("zero"):
         return None
     shown = case.stats.get("expert_episodes")
-    few = f"; the expert showed {shown} episodes" if shown else ""
-    return Finding(
-        "too-few-trajectories",
-        f"The value gaps drown in noise: the largest is {max(gaps):.3g}, and standard errors are up to {max(errors):.2g}{few}.",
-        "More episodes of the expert, and more trajectories a policy: four times as many halve the error.",
-    )
+    mend = "More episodes of the expert, and more trajectories a policy: four times as many halve the error."
+    if _noiseless(case):
+        whose = "the expert showed one" if shown == 1 else "the expert, or each policy, has one"
+        told = f"One episode tells no noise, and {whose}: the value gaps, up to {max(gaps):.3g}, may be chance."
+        return Finding("too-few-trajectories", told, mend, flags=("--episodes",))
+    if any(g > 2 * e for g, e in zip(gaps, errors, strict=True)):
+        return None
+    few = f"; the expert showed {counted(shown, 'episode')}" if shown else ""
+    told = f"the largest is {max(gaps):.3g}, and standard errors are up to {max(errors):.2g}{few}"
+    return Finding("too-few-trajectories", f"The value gaps drown in noise: {told}.", mend, flags=("--episodes",))
 
 
 def cut_short(case: Case) -> Finding | None:

@@ -8,6 +8,8 @@ from irl_gym.solvers import Status
 
 FAR = 1e-3
 """A duality gap above this, in units of the objective, is far from the optimum."""
+ROUNDING = 1e-6
+"""A gap below this, in units of the price that the objective is less, is what two sums leave that cancel."""
 OTHER = {"clarabel": "highs", "highs": "clarabel"}
 
 
@@ -30,13 +32,16 @@ def inaccurate(case: Case) -> Finding | None:
         f"{solver} stopped short of its tolerances on the program {name!r}"
         f"{'' if gap is None else f'; recomputed, the reward is at most {max(gap, 0.0):.1e} below the optimum'}.",
         f"{other}; or a gamma further from 1.",
+        flags=("--gamma",),
     )
 
 
 def far_from_optimal(case: Case) -> Finding | None:
     """Weak duality, recomputed: no reward has a larger objective than the bound, and none with these margins is smaller."""
+    if case.claims.get("zero"):  # an objective of 0 is no unit; a zero reward has a finding of its own
+        return None
     gap, objective = case.claims.get("duality_gap"), case.claims.get("objective")
-    if gap is not None and objective is not None and gap > FAR * max(abs(objective), abs(case.claims.get("margin_cap") or 0.0)):
+    if gap is not None and objective is not None and gap > _far(case, objective):
         what = f"its objective is {objective:.4g} and the bound {gap:.2g} above it"
     else:
         norm, least = case.claims.get("l1_norm"), case.claims.get("least_l1_norm")
@@ -48,6 +53,13 @@ def far_from_optimal(case: Case) -> Finding | None:
         f"The reward is not proved to be the program's optimum: {what}.",
         'The other solver (solver="highs" or "clarabel"), or no time_limit.',
     )
+
+
+def _far(case: Case, objective: float) -> float:
+    """The gap from which a reward is far from the optimum, in units of the objective."""
+    norm = case.claims.get("l1_norm") or case.claims.get("alpha_l1_norm") or 0.0
+    price = (case.claims.get("l1") or 0.0) * norm
+    return max(FAR * max(abs(objective), case.claims.get("margin_cap") or 0.0), ROUNDING * price)
 
 
 def retried(case: Case) -> Finding | None:

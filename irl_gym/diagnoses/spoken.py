@@ -1,48 +1,24 @@
-"""What the doctor says, for who does not write Python: mends as flags, and states and actions by their names.
+"""What the doctor says, for who does not write Python: states and actions by their names, and the flags that a run can take.
 
-Findings name arguments as Python writes them, `l1="auto"`, and states by their rows, `s=13 a=2`. A reader of the command line
-knows `--l1 auto`, and "row 1, column 5; right".
+Findings name states by their rows, `s=13 a=2`. A reader of the command line knows "row 1, column 5; right".
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-VALUED = {"l1": "--l1", "margin_cap": "--margin-cap", "reward_on": "--reward-on", "slack": "--slack"}
-"""Arguments that a mend gives a value, and what scripts/recover_and_retrain.py calls them."""
-WORDS = {
-    r"FiniteLP\(\) with its defaults": "--learner finite-lp --l1 0 --margin-cap auto",
-    r"FiniteLP\b": "--learner finite-lp",
-    r"[Mm]ore episodes": "--episodes",
-    r"[Mm]ore rounds": "--rounds",
-    r"(?:larger|smaller) gamma|a gamma further": "--gamma",
-    r"features\b": "--features",
-    "start_seeds": "--start-seeds",
-    "epsilon": "--epsilon",
-    "total_timesteps": "--total-timesteps",
-    "`inner`": "--inner",
-    r"with shaping|shaping=True": "--shaping",
-}
-"""What else a mend says, as patterns, and the flags for it."""
-_SAID = re.compile(rf'(?P<name>{"|".join(VALUED)})=(?P<quote>"?)(?P<value>[-\w.]+?)(?P=quote)(?![-\w"]|\.\d)|{"|".join(WORDS)}')
+RECORDING = ("--expert", "--episodes", "--epsilon")
+"""Flags that choose an expert and record its episodes: they say nothing to a run that was given a dataset."""
 _STATE = re.compile(r"\bs=(\d+)(?: a=(\d+))?")
 
 
-def flags_of(mend: str, *, given: bool = False) -> tuple[str, ...]:
-    """The flags of scripts/recover_and_retrain.py that a mend speaks of, in its order, each once; none where it names none.
+def usable_flags(flags: Iterable[str], *, given: bool = False) -> tuple[str, ...]:
+    """The flags of a finding that a run can take.
 
     Args:
-        mend: of a finding.
+        flags: of a finding; see `Finding.flags`.
         given: the run was given a dataset, so that no flag records other episodes.
     """
-    found: dict[str, None] = {}
-    for said in _SAID.finditer(mend):
-        if said["name"] is not None:
-            found[f"{VALUED[said['name']]} {said['value'].removesuffix('.0')}"] = None
-            continue
-        flag = next(flag for word, flag in WORDS.items() if re.fullmatch(word, said[0]))
-        if not (given and flag in ("--episodes", "--epsilon", "--start-seeds")):
-            found[flag] = None
-    return tuple(found)
+    return tuple(one for one in flags if not (given and one.split()[0] in RECORDING))
 
 
 def with_names(sentence: str, state_name: Callable[[int], str], actions: Sequence[str]) -> str:

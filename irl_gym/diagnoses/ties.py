@@ -5,6 +5,7 @@ import numpy as np
 from irl_gym._typing import Indices
 from irl_gym.diagnoses.case import Case, Rows
 from irl_gym.diagnoses.findings import Finding, counted, named
+from irl_gym.diagnoses.mends import DEFAULTS, Mend, breaking, on_steps
 from irl_gym.errors import DegenerateExpert
 
 
@@ -23,27 +24,28 @@ def violated(case: Case) -> Finding | None:
     return _found("expert-not-optimal", told, _obey(case), rows, which)
 
 
-def _found(name: str, told: str, mend: str, rows: Rows, which: np.ndarray) -> Finding:
+def _found(name: str, told: str, mend: Mend, rows: Rows, which: np.ndarray) -> Finding:
     """A finding about some rows (k,); its sentence has {states}, how many there are, and {where}, the first of them."""
     states, actions = rows.states[which], rows.actions[which]
     sentence = told.format(states=counted(np.unique(states).size), where=named(states, actions))
-    return Finding(name, sentence, mend, states, tuple(actions.tolist()))
+    return Finding(name, sentence, mend[0], states, tuple(actions.tolist()), mend[1])
 
 
-def _obey(case: Case) -> str:
+def _obey(case: Case) -> Mend:
     """What to do about violations, by what the learner could have done."""
     slack = case.claims.get("slack")
     if slack is not None:
         return (
-            f"Nothing, if these are the expert's errors: slack={slack:g} gives them up. If they are not, raise slack, or show "
-            "more episodes there."
+            f"Nothing, if these are the expert's errors: slack={slack:g} gives them up. If they are not, a larger slack, such "
+            f"as {10 * slack:g}, or more episodes there.",
+            (f"--slack {10 * slack:g}",),
         )
     if case.linear:
-        return "More or other features; a larger S_0; or FiniteLP, where the table is small enough."
+        return "More or other features; a larger S_0; or FiniteLP, where the table is small enough.", ("--features",)
     found = case.best
     if found is None or isinstance(found, DegenerateExpert):
-        return 'reward_on="state-action"; or slack=10.0, if the expert errs.'
-    return "FiniteLP() with its defaults: it finds a reward on this table under which the expert is optimal."
+        return 'reward_on="state-action"; or slack=10.0, if the expert errs.', on_steps(case)
+    return "FiniteLP() with its defaults: it finds a reward on this table under which the expert is optimal.", DEFAULTS
 
 
 def same_successors(case: Case) -> Finding | None:
@@ -66,7 +68,7 @@ def same_successors(case: Case) -> Finding | None:
     told = (
         f"In {{states}} an action leads where the expert's own leads, {harm}: {{where}}. No reward on states tells them apart."
     )
-    return _found("same-successors", told, 'reward_on="state-action".', rows, which)
+    return _found("same-successors", told, ('reward_on="state-action".', on_steps(case)), rows, which)
 
 
 def _marginless(case: Case, rows: Rows) -> np.ndarray:
@@ -80,14 +82,9 @@ def avoidable_ties(case: Case) -> Finding | None:
     rows, which, _, guessed = _split(case)
     if rows is None or not which.size:
         return None
-    mend = 'margin_cap="auto" with l1=0.0: solved here, it gives the expert a margin in each of these states.'
-    if case.linear:
-        mend = 'margin_cap="auto"; if it stays, more or other features, or FiniteLP.'
-    elif guessed:
-        mend = 'margin_cap="auto" with l1=0.0; if it stays, reward_on="state-action".'
     though = "" if guessed else ", though some reward prefers it"
     told = f"In {{states}} the reward ties the expert with another action{though}: {{where}}. An agent may take either."
-    return _found("avoidable-ties", told, mend, rows, which)
+    return _found("avoidable-ties", told, breaking(case, rows.states[which]), rows, which)
 
 
 def unbreakable_ties(case: Case) -> Finding | None:
@@ -95,10 +92,11 @@ def unbreakable_ties(case: Case) -> Finding | None:
     rows, _, which, _ = _split(case)
     if rows is None or not which.size:
         return None
-    kind, mend = "reward", "Give the expert as the (S, A) set of its optimal actions."
+    kind, mend = "reward", ("Give the expert as the (S, A) set of its optimal actions.", ())
     if case.on_states:
         kind = "reward on states"
-        mend = 'reward_on="state-action"; or give the expert as the (S, A) set of its optimal actions, if both are as good.'
+        told = 'reward_on="state-action"; or give the expert as the (S, A) set of its optimal actions, if both are as good.'
+        mend = told, on_steps(case)
     told = f"In {{states}} no {kind} under which the expert is optimal everywhere prefers its action to another: {{where}}."
     return _found("unbreakable-ties", told, mend, rows, which)
 

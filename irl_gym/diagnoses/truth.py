@@ -2,51 +2,68 @@
 
 import numpy as np
 
+from irl_gym._typing import Indices
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding, counted, named
+from irl_gym.diagnoses.mends import Mend, breaking, on_steps
 from irl_gym.diagnoses.unseen import entered
-from irl_gym.dynamic_programming import occupancy
-from irl_gym.metrics import policy_value, random_value, worst_tie
+from irl_gym.dynamic_programming import backup, evaluate_policy, occupancy
+from irl_gym.metrics import policy_value, random_value
 from irl_gym.scores import FEWEST, Scale
 
 MUCH = 0.05
 """Share of what can be had over random actions; a loss above it is worth a sentence."""
 
 
-def _expert_value(case: Case) -> float | None:
-    """The expert's true value from d0; None where it enters states in which nothing is known of it."""
-    if case.mdp is None or case.true is None or not case.has_expert:
-        return None
+def _strays(case: Case) -> bool:
+    """Does the expert enter states in which nothing is known of it?"""
+    assert case.mdp is not None
     visited = entered(case.mdp, (case.distribution > 0) & case.known[:, None])
-    if (visited & case.acting & ~case.known).any():
-        return None
-    return policy_value(case.mdp, case.true, case.distribution)
+    return bool((visited & case.acting & ~case.known).any())
+
+
+def _whose(case: Case) -> str:
+    """Whose value that of `Case.continued` is."""
+    if not case.has_expert:
+        return "what is possible"
+    if _strays(case):
+        return "the expert as it was seen, and at best elsewhere,"
+    return "the expert as it was seen" if _by_episodes(case) else "the expert"
+
+
+def _by_episodes(case: Case) -> bool:
+    """Is the expert known by its episodes only?"""
+    return not case.fully_known or bool(case.judged.get("demonstrations", {}).get("episodes_only"))
 
 
 def poor_expert(case: Case) -> Finding | None:
     """IRL explains what the expert does, not what it should: its own value bounds what a faithful agent earns."""
-    value = _expert_value(case)
-    if value is None or case.mdp is None or case.true is None or case.true_optimum is None:
+    shown = case.continued
+    if shown is None or not case.has_expert or case.mdp is None or case.true is None or case.true_optimum is None:
         return None
+    value = policy_value(case.mdp, case.true, shown)
     best, random = float(case.mdp.d0 @ case.true_optimum.V), random_value(case.mdp, case.true)
-    rounding = case.true_tie
-    mend = "A better expert: plan for the true reward, train longer, or drop its bad episodes."
-    if value <= random - rounding or (value <= random + rounding and best > random + rounding):
-        sentence = f"earns {value:.4g}, no more than random actions, {random:.4g}, where {best:.4g} is possible"
-        return Finding("expert-worse-than-random", f"Under the true reward the expert {sentence}.", mend)
+    rounding, (mend, flags) = case.true_tie, _better(case)
+    earns = f"Under the true reward {_whose(case)} earns {value:.4g}"
+    if value < random - rounding or (value <= random + rounding and best > random + rounding):
+        told = f"{earns}, no more than random actions, {random:.4g}, where {best:.4g} is possible."
+        return Finding("expert-worse-than-random", told, mend, flags=flags)
     if best - value <= max(MUCH * (best - random), rounding):
         return None
     Q = case.true_optimum.Q
-    loss = np.where(case.mdp.terminal | ~case.known, 0.0, Q.max(axis=1) - (case.distribution * Q).sum(axis=1))
-    weight = occupancy(case.mdp, case.distribution).sum(axis=1) * loss
-    states = _heaviest(weight)
-    return Finding(
-        "expert-suboptimal",
-        f"Under the true reward the expert earns {value:.4g} where {best:.4g} is possible and random actions earn "
-        f"{random:.4g}; it loses most in {named(states)}.",
-        mend,
-        states,
-    )
+    loss = np.where(case.mdp.terminal | ~case.known, 0.0, Q.max(axis=1) - (shown * Q).sum(axis=1))
+    states = _heaviest(occupancy(case.mdp, shown).sum(axis=1) * loss)
+    told = f"{earns} where {best:.4g} is possible and random actions earn {random:.4g}; it loses most in {named(states)}."
+    return Finding("expert-suboptimal", told, mend, states, flags=flags)
+
+
+def _better(case: Case) -> Mend:
+    """How to have a better expert: itself, or what its episodes show of it."""
+    if not _by_episodes(case):
+        told = "A better expert: plan for the true reward, train longer, or drop its bad episodes."
+        return told, ("--expert value-iteration",)
+    told = "More episodes, in which its own actions are the most frequent; less noise (epsilon); or leave out its bad episodes."
+    return told, ("--episodes", "--epsilon")
 
 
 def few_episodes(case: Case) -> Finding | None:
@@ -70,27 +87,49 @@ def few_episodes(case: Case) -> Finding | None:
 
 
 def lossy_ties(case: Case) -> Finding | None:
-    """The worst policy among those greedy under R, under the true reward (`metrics.worst_tie`): what an agent may find."""
-    if case.mdp is None or case.true is None or case.true_optimum is None or not case.speaks or case.reward is None:
+    """The worst policy among those greedy under R, under the true reward (`metrics.worst_tie`): what an agent may find.
+
+    What it loses against the expert is shared out among its actions, by their value in the expert's hands; the expert's own
+    actions are no ties that a reward could break.
+    """
+    if case.continued is None or case.worst is None or not case.speaks or case.mdp is None or case.true is None:
         return None
-    worst = worst_tie(case.mdp, case.reward, case.true)
-    expert = _expert_value(case)
-    fair = float(case.mdp.d0 @ case.true_optimum.V) if expert is None else expert
-    random = random_value(case.mdp, case.true)
-    rounding = case.true_tie
-    if fair - worst.value <= max(MUCH * abs(fair - random), rounding):
+    V, worst = evaluate_policy(case.mdp, case.true, case.continued), case.worst
+    fair, random = float(case.mdp.d0 @ V), random_value(case.mdp, case.true)
+    much = max(MUCH * abs(fair - random), case.true_tie)
+    if fair - worst.value <= much:
         return None
-    Q = case.true_optimum.Q
-    loss = Q.max(axis=1) - Q[np.arange(case.mdp.n_states), worst.policy]
-    states = _heaviest(np.where(case.mdp.terminal, 0.0, occupancy(case.mdp, worst.policy).sum(axis=1) * loss))
+    here = np.arange(case.mdp.n_states)
+    loss = V - backup(case.mdp, case.true.expected(case.mdp), V)[here, worst.policy]
+    lost = np.where(case.mdp.terminal, 0.0, occupancy(case.mdp, worst.policy).sum(axis=1) * np.maximum(loss, 0.0))
+    own = case.known & (case.distribution[here, worst.policy] > 0) if case.has_expert else np.zeros_like(case.acting)
+    told = f"{worst.value + 0.0:.4g}, {_whose(case)} {fair:.4g} and random actions {random:.4g}"
+    blamed = np.where(own, 0.0, lost)
+    if blamed.sum() <= much:
+        return None if poor_expert(case) else _mixed(lost, worst.policy, told)
+    states = _heaviest(blamed)
     actions = worst.policy[states]
-    whose = "what is possible" if expert is None else "the expert"
+    mend, flags = _break(case, states, actions)
     return Finding(
         "worst-tie",
-        f"The reward allows too much: the worst policy that is greedy under it earns {worst.value + 0.0:.4g}, "
-        f"{whose} {fair:.4g} and random actions {random:.4g}. It loses most in {counted(states.size)}: "
-        f"{named(states, actions)}.",
-        _break(case, states, actions),
+        f"The reward allows too much: the worst policy that is greedy under it earns {told}. It loses most in "
+        f"{counted(states.size)}: {named(states, actions)}.",
+        mend,
+        states,
+        tuple(actions.tolist()),
+        flags,
+    )
+
+
+def _mixed(lost: np.ndarray, policy: np.ndarray, told: str) -> Finding:
+    """The expert takes several actions in a state, of which not all are as good; a learner takes them to be."""
+    states = _heaviest(lost)
+    actions = policy[states]
+    return Finding(
+        "expert-suboptimal",
+        f"The actions that the expert mixes are not all as good: under the true reward the worst policy that is greedy under "
+        f"the learned one, and takes them, earns {told}. It loses most in {named(states, actions)}.",
+        "Give the actions that it prefers: `most_frequent(empirical_policy(...))` for an expert that errs.",
         states,
         tuple(actions.tolist()),
     )
@@ -102,17 +141,16 @@ def _heaviest(weight: np.ndarray) -> np.ndarray:
     return order[weight[order] > 0.01 * weight.sum()].astype(np.int64)
 
 
-def _break(case: Case, states: np.ndarray, actions: np.ndarray) -> str:
+def _break(case: Case, states: Indices, actions: np.ndarray) -> Mend:
     """How these ties are broken."""
     if case.has_expert and not case.known[states].all():
-        return "More episodes: in some of these states nothing is known of the expert."
+        return "More episodes: in some of these states nothing is known of the expert.", ("--episodes",)
     if case.rows is not None and case.on_states:
         trivial = case.rows.trivial & ~case.rows.equal
         same = set(zip(case.rows.states[trivial].tolist(), case.rows.actions[trivial].tolist(), strict=True))
         if same & set(zip(states.tolist(), actions.tolist(), strict=True)):
-            return 'reward_on="state-action": some of these actions have the successors of the expert\'s own.'
+            told = 'reward_on="state-action": some of these actions have the successors of the expert\'s own.'
+            return told, on_steps(case)
     if not case.judges_states:
-        return "More rounds or features, so that these actions lead to other features than the expert's."
-    if case.linear:
-        return 'margin_cap="auto"; if it stays, more or other features, or FiniteLP.'
-    return 'margin_cap="auto" with l1=0.0, and reward_on="state-action" where that leaves them.'
+        return "More rounds or features, so that these actions lead to other features than the expert's.", ("--rounds",)
+    return breaking(case, states)

@@ -23,6 +23,7 @@ def unvisited(case: Case) -> Finding | None:
         f"{named(unknown)}.{chosen.get(kept, '')}",
         "More episodes; more start_seeds, or starts elsewhere; or an expert with some noise (epsilon), that strays.",
         unknown,
+        flags=("--episodes", "--epsilon"),
     )
 
 
@@ -52,13 +53,17 @@ def strays(case: Case) -> Finding | None:
     if not beyond.size or (case.judges_states and not unknown):  # else ties, which have sentences of their own
         return None
     of = f", in {unknown:,} of which nothing is known of it" if unknown else ""
-    mend = 'unvisited="avoid", and more episodes of the expert.'
+    avoided = case.reward is not None and case.reward.note.get("unvisited") == "avoid"
+    mend = "More episodes of the expert." if avoided else 'unvisited="avoid", and more episodes of the expert.'
+    flags = ("--episodes",)
     if not case.judges_states:
         mend = "More rounds, or features that tell these states from those that the expert visits."
+        flags = ("--rounds",)
     return Finding(
         "strays",
         f"An agent that is greedy under the reward can reach {counted(beyond.size)} that the expert never enters{of}: "
         f"{named(beyond)}.",
         mend,
         beyond,
+        flags=flags,
     )

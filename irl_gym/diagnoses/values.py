@@ -51,6 +51,7 @@ def _small(case: Case, under: str, vanished: np.ndarray, larger: float) -> Findi
         f"{counted(states.size)}, {vanished.mean():.0%}: {named(states)}.",
         f"A larger gamma: at {larger:g}, with the same reward, it no longer is.",
         states,
+        flags=(f"--gamma {larger:g}",),
     )
 
 
@@ -104,6 +105,7 @@ def gamma_near_one(case: Case) -> Finding | None:
         f"gamma is so near 1 that margins drown: 1 / (1 - gamma) is {1 / (1 - case.mdp.gamma):.3g}, so a solver's residuals "
         f"leave {case.tolerance:.2g} of a margin open, and the typical one is {typical:.2g}.",
         mend,
+        flags=(f"--gamma {fine[-1]:g}",) if fine else ("--gamma",),
     )
 
 
@@ -118,12 +120,13 @@ def never_ends(case: Case) -> Finding | None:
     if margins.size and np.median(margins) > FAINT * level:
         return None
     told = f"margins are typically {np.median(margins):.2g}" if margins.size else "there is no margin at all"
+    again = "retrain " if case.shaped else "retrain with shaping, which leaves only differences, and "
     return Finding(
         "never-ends",
         f"No reachable state is terminal or absorbing, so a constant in R adds the same to every policy: values are up to "
         f"{level:.3g}, and {told}.",
-        "If the task ends, let the environment say `terminated` there. If it goes on, retrain with shaping, which leaves only "
-        "differences, and with a time limit.",
+        f"If the task ends, let the environment say `terminated` there. If it goes on, {again}with a time limit.",
+        flags=() if case.shaped else ("--shaping",),
     )
 
 
@@ -146,4 +149,5 @@ def faint_margins(case: Case) -> Finding | None:
         "faint-margins",
         f"An agent will hardly see the margins: typically {typical:.2g}, where values range over {span:.3g}.",
         f"Retrain on ExpectedAdvantage(clip={typical:.2g}).apply(reward, mdp), as the loop does with shaping=True.",
+        flags=("--shaping",),
     )

@@ -1,5 +1,6 @@
 """What every learner is and gives: a frozen record of hyper-parameters, and a frozen outcome."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
@@ -56,6 +57,10 @@ class IRLResult(Generic[AnyReward, AnyProof]):
     policy: Policy | None = None
     """A policy planned for the reward, where learning made one."""
 
+    def record(self) -> dict[str, Any]:
+        """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""
+        return without_nan({"status": self.status.value, "objective": self.objective, "stats": dict(self.stats)})
+
 
 @runtime_checkable
 class Learner(Protocol):
@@ -64,6 +69,15 @@ class Learner(Protocol):
     def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:
         """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
         ...
+
+
+def without_nan(value: Any) -> Any:
+    """None for NaN, at any depth of mappings and lists: json has no other word for a number that is not known."""
+    if isinstance(value, Mapping):
+        return {key: without_nan(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(one) for one in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def check_weighing(learner: Any) -> None:

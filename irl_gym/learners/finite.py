@@ -240,7 +240,9 @@ class _Task:
     def _nothing_to_compare(self) -> DegenerateExpert:
         c, where = self.comparisons, f"the {self.rows.size} reachable states"
         if self.part.terminal.all():
-            return DegenerateExpert("every start is terminal, so no action is ever taken: expected an episode of a step at least.")
+            return DegenerateExpert(
+                "every start is terminal, so no action is ever taken: expected an episode of a step at least."
+            )
         if c.equal.all():
             return DegenerateExpert(f"the expert takes every action in each of {where}: expected one that it leaves out.")
         if (c.equal | c.trivial).all():

@@ -51,8 +51,11 @@ class TrajectoryCertificate(Proven):
 
     @property
     def expert_optimal(self) -> bool:
-        """Is the expert as good as the planned policy, and as each one found before, to two standard errors?"""
-        errors = np.append(self.gap_errors, self.regret_error)
+        """Is the expert as good as the planned policy, and as each one found before, to two standard errors?
+
+        Where one episode tells no error, the sampled values are compared as they are.
+        """
+        errors = np.nan_to_num(np.append(self.gap_errors, self.regret_error))
         return bool((np.append(self.gaps, -self.regret) >= -2 * errors - 1e-9).all())
 
     @property

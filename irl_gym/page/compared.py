@@ -72,7 +72,9 @@ def reward_panel(name: str, title: str, reward: TabularReward, scene: Scene) -> 
     told = f"Paid for a step, by state and action, {_counts(R[acting])}."
     if scene.place is not None and maps.has_crosses(scene.place):
         told += " Each cell has one field for each move."
-        return maps.crosses(name, title, scene.place, R, caption=told, shown=acting)
+        if not scene.place.layout.directions.any(axis=1).all():
+            told += " The one in its middle is for staying."
+        return maps.crosses(name, title, scene.place, R, scene.run.actions, caption=told, shown=acting)
     if scene.place is not None:
         told += " Drawn is the largest over actions."
         return maps.heat(

@@ -16,15 +16,16 @@ from irl_gym.page import compared, panels
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
-from irl_gym.page.pooled import over_seeds, spoken
-from irl_gym.page.proof import ROUNDING
-from irl_gym.page.report import page_title, policy_row
+from irl_gym.page.pooled import over_seeds
+from irl_gym.page.proof import ROUNDING, finding
+from irl_gym.page.ranked import learning, sentence
+from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.training import curves
-from irl_gym.page.written import number, percent, score_of, seconds
-from irl_gym.pooling import Pool, pools
-from irl_gym.runs import Run
+from irl_gym.page.worlds import one_world, run_places, run_title
+from irl_gym.page.written import number, percent, seconds
+from irl_gym.pooling import pools
+from irl_gym.runs import SURPRISES, Run, not_understood
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26
@@ -40,18 +41,42 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
         path: of the file.
 
     Raises:
-        InvalidParameter: fewer or more runs.
+        InvalidParameter: fewer or more runs, or a folder of the file's own name.
+        RunIncomplete: a run whose files cannot be understood, by its folder.
     """
     if not 2 <= len(runs) <= MOST_RUNS:
         raise InvalidParameter(f"runs has {len(runs)} of them: expected 2 to {MOST_RUNS} to put side by side.")
-    letters = [chr(ord("A") + i) for i in range(len(runs))]
-    named = dict(zip(letters, runs, strict=True))
+    named = lettered(runs)
+    try:
+        context, data = _page(named)
+    except SURPRISES:
+        _find_fault(named)
+        raise
+    write_page(path, "compare.html", context, data, SCRIPTS)
+
+
+def _find_fault(named: Mapping[str, Run]) -> None:
+    """Name the run whose page cannot be made even alone."""
+    for letter, run in named.items():
+        try:
+            _page({letter: run})
+        except SURPRISES as error:
+            raise not_understood(error, run.path) from error
+
+
+def lettered(runs: Sequence[Run]) -> dict[str, Run]:
+    """Runs by their letters."""
+    return {chr(ord("A") + i): run for i, run in enumerate(runs)}
+
+
+def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What the template shows, and the scripts."""
     scenes = {letter: Scene.of(run) for letter, run in named.items()}
     places, found = run_places(named), pools(named)
     sections = [
         _results(named),
         over_seeds(found, places, same=one_world(named)),
-        _learning(named),
+        learning(named),
         _rewards(named, scenes),
         _policies(scenes),
         _differences(named),
@@ -59,64 +84,9 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
         _doctors(named),
     ]
     kept = [section for section in sections if section is not None]
-    facts = [(letter, f"{run_title(run, places[letter])} ({run.path.name})") for letter, run in named.items()]
-    context = {"title": f"{len(runs)} runs side by side", "facts": facts, "sentence": _sentence(named, found), "sections": kept}
-    data = {"figures": specs(kept), "slider": None, "episodes": {}}
-    write_page(path, "compare.html", context, data, SCRIPTS)
-
-
-def run_places(named: Mapping[str, Run]) -> dict[str, str]:
-    """What the environment of each run is called: its id, with the arguments where runs of one id differ in them."""
-    given = {letter: dict(run.config.get("env_kwargs") or {}) for letter, run in named.items()}
-    told = {}
-    for letter, run in named.items():
-        same = [given[other] for other, one in named.items() if page_title(one) == page_title(run)]
-        keys = [
-            key
-            for key in dict.fromkeys(key for one in same for key in one)
-            if any(one.get(key) != same[0].get(key) for one in same)
-        ]
-        differing = ", ".join(f"{key}={written(given[letter][key])}" for key in keys if key in given[letter])
-        told[letter] = page_title(run) + (f" ({differing or 'no arguments'})" if keys else "")
-    return told
-
-
-def run_title(run: Run, place: str) -> str:
-    """Environment, learner and seed."""
-    learner = (run.config.get("learner") or {}).get("type", "")
-    return f"{place}, {learner}, seed {run.config.get('seed')}"
-
-
-def one_world(named: Mapping[str, Run]) -> bool:
-    """Are all runs of the same environment with the same discount, so that their values can be compared?"""
-    worlds = {(page_title(run), written(run.config.get("env_kwargs") or {}), run.config["gamma"]) for run in named.values()}
-    return len(worlds) == 1
-
-
-def _sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
-    """Which agent is best, by score; of runs that only differ in their seed, how good they are together."""
-    scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
-    known = {letter: score for letter, score in scores.items() if score is not None}
-    if not known:
-        return "None of these runs has a score; each run's own page says why."
-    if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
-        return (
-            f"Over {len(named)} seeds the retrained agents have a score of {spoken(found[0].score)}, the interquartile mean "
-            "with its 95 % interval. Random actions are 0, the expert is 1."
-        )
-    if not one_world(named):
-        each = "; ".join(f"run {letter} {score_of(score)}" for letter, score in scores.items())
-        return (
-            f"Scores of the retrained agents: {each}. Random actions are 0, the expert is 1. The environments differ, so a "
-            "score says how near each agent comes to its own expert, not which run is better."
-        )
-    best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
-    if score_of(known[best]) == score_of(known[worst]):
-        return f"The retrained agents are equally good, with a score of {score_of(known[best])}."
-    return (
-        f"The retrained agent of run {best} has the best score, {score_of(known[best])}; that of run {worst} the worst, "
-        f"{score_of(known[worst])}. Random actions are 0, the expert is 1."
-    )
+    facts = [(letter, f"{run_title(run, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
+    context = {"title": f"{len(named)} runs side by side", "facts": facts, "sentence": sentence(named, found), "sections": kept}
+    return context, {"figures": specs(kept), "slider": None, "episodes": {}}
 
 
 def _results(named: Mapping[str, Run]) -> Section:
@@ -153,30 +123,6 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
     spent = [record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"]
     yield "time of all stages", seconds(sum(spent))
-
-
-def _learning(named: Mapping[str, Run]) -> Section:
-    """All learning curves in one figure."""
-    title, trained = "Learning curves", {letter: run for letter, run in named.items() if len(run.curve.steps)}
-    if not trained:
-        return Section("learning", title, "The agents were planned exactly, not trained.")
-    same = one_world(named)
-    series, levels = {}, {}
-    for letter, run in trained.items():
-        policies = run.metrics["policies"]
-        low, high = policies["random"]["value"], policies["expert"]["value"]
-        if not same and not high > low:
-            continue
-        values = run.curve.value if same else (run.curve.value - low) / (high - low)
-        series[f"run {letter}"] = (run.curve.steps, values, None)
-        levels = {"expert": high, "random": low} if same else {"expert": 1.0, "random": 0.0}
-    if not series:
-        return Section("learning", title, "No run has a score to draw.")
-    what = "discounted value from the start" if same else "score"
-    told = "the expert's and random actions' levels are dashed" if same else "random actions are 0, the expert is 1"
-    ends = "; ".join(f"{name} ends at {number(values[-1])}" for name, (_, values, _) in series.items())
-    panel = Panel("curves", what.capitalize(), f"{ends}; {told}.", curves(series, levels, what), height=400)
-    return Section("learning", title, "What each agent earned under the true reward as it trained.", [panel])
 
 
 def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section:
@@ -271,14 +217,15 @@ def _proof(held: Mapping[str, Any], key: str) -> str:
 
 def _doctors(named: Mapping[str, Run]) -> Section:
     """What the doctor says of each run."""
-    findings = []
-    for letter, run in named.items():
+    findings, seen = [], {letter: run for letter, run in named.items() if run.diagnosis is not None}
+    for letter, run in seen.items():
         for one in (run.diagnosis or {}).get("findings", ()):
-            name = f"run {letter}: {str(one.get('name', '')).replace('-', ' ').replace('_', ' ')}"
-            findings.append({"name": name, "sentence": one.get("sentence", ""), "mend": one.get("mend", ""), "states": ""})
-    lead = (
-        "What is to be said against each reward, and what to do about it."
-        if findings
-        else "The doctor has nothing to complain about."
-    )
-    return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})
+            told = finding(run, one)
+            findings.append({**told, "name": f"run {letter}: {told['name']}"})
+    unseen = [letter for letter in named if letter not in seen]
+    missed = f"The doctor did not look at run{'s' * (len(unseen) > 1)} {', '.join(unseen)}." if unseen else ""
+    lead = "What is to be said against each reward, and what to do about it." if findings else ""
+    if seen and not findings:
+        of = "the others" if unseen else "these runs"
+        lead = f"The doctor has nothing to complain about in {of}."
+    return Section("doctor", "Doctor", f"{missed} {lead}".strip(), (), "doctor", {"findings": findings})

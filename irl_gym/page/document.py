@@ -17,11 +17,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from irl_gym.run_folder import write_text
+
 HERE = Path(__file__).parent
 
 
 def write_page(path: str | os.PathLike, template: str, context: Mapping[str, Any], data: Any, scripts: Sequence[str]) -> None:
-    """Write a page beside, then rename.
+    """Write a page beside, then rename; where that fails nothing is left beside.
 
     Args:
         path: of the file.
@@ -29,8 +31,11 @@ def write_page(path: str | os.PathLike, template: str, context: Mapping[str, Any
         context: what the template shows.
         data: json values for the scripts.
         scripts: names of scripts in this folder, run in this order after Plotly.
+
+    Raises:
+        InvalidParameter: there is a folder of the file's own name.
+        OSError: the system refused.
     """
-    path = Path(path)
     code = "\n".join(_asset(name) for name in scripts)
     plotly = get_plotlyjs()
     embedded = {
@@ -41,9 +46,7 @@ def write_page(path: str | os.PathLike, template: str, context: Mapping[str, Any
         "data": Markup(embedded_json(data)),
     }
     text = _templates().get_template(template).render(**context, **embedded)
-    beside = path.with_name(f".{path.name}.tmp")
-    beside.write_text(text, encoding="utf-8", newline="\n")
-    beside.replace(path)
+    write_text(Path(path), text)
 
 
 def embedded_json(data: Any) -> str:

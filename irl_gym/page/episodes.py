@@ -8,16 +8,13 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
-from irl_gym.films import Film, Moment
+from irl_gym.films import MOST_BYTES, Film, Moment
 from irl_gym.page.maps import geometry
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, sentence_of, state_called, sum_of
 from irl_gym.runs import Run
 
-MOST_BYTES = 700_000
-"""Of the pictures of one film."""
-MOST_MOMENTS = 2_000
 TITLES = {"expert": "Expert", "agent": "Retrained agent"}
 ENDS = {
     "terminated": "The episode ends by itself.",
@@ -36,13 +33,12 @@ def episodes(run: Run, scene: Scene | None) -> tuple[Section, dict[str, Any]]:
     for name, film in films.items():
         pictures, of = _pictures(film)
         on_map = not pictures and place is not None and all(one.state is not None for one in film.steps)
-        moments = film.steps[:MOST_MOMENTS]
         players.append(
             {
                 "name": name,
                 "pictures": pictures,
                 "map": _map(place) if on_map and place is not None else None,
-                "moments": [_moment(one, film, of, place if on_map else None) for one in moments],
+                "moments": [_moment(one, film, of, place if on_map else None) for one in film.steps],
             }
         )
     lead = (
@@ -66,7 +62,7 @@ def _told(name: str, film: Film) -> dict[str, Any]:
         "name": name,
         "title": title,
         "said": said,
-        "last": min(len(film.steps), MOST_MOMENTS) - 1,
+        "last": steps,
         "why": sentence_of(film.without_frames),
     }
 

@@ -36,6 +36,17 @@ function arrow(row, column, down, right, alone, size, x, y) {
   y.push(null);
 }
 
+// A dot for an action that stays: large where it is alone, else between the shafts of the others.
+function dot(row, column, alone, size, x, y) {
+  const radius = (alone ? 0.15 : 0.07) * size;
+  for (let i = 0; i <= 16; i += 1) {
+    x.push(column + radius * Math.cos((i * Math.PI) / 8));
+    y.push(row + radius * Math.sin((i * Math.PI) / 8));
+  }
+  x.push(null);
+  y.push(null);
+}
+
 // The outlines of all arrows, those of shaded cells apart: {plain: {x, y}, off: {x, y}}.
 function outlines(drawn) {
   const [rows, columns] = drawn.shape;
@@ -47,7 +58,9 @@ function outlines(drawn) {
       const into = drawn.off[cell] ? made.off : made.plain;
       taken.forEach((a) => {
         const [down, right] = drawn.directions[a];
-        if (down || right) arrow(row, column, down, right, taken.length === 1, drawn.every, into.x, into.y);
+        const alone = taken.length === 1;
+        if (down || right) arrow(row, column, down, right, alone, drawn.every, into.x, into.y);
+        else dot(row, column, alone, drawn.every, into.x, into.y);
       });
     }
   }
@@ -71,6 +84,14 @@ function fitLetters(figure, width) {
   if (map && map.texttemplate && cell < READABLE) map.texttemplate = "";
 }
 
+// What a cell of a map is called where its place and number do not say it: the action, and of a field of a cell the cell.
+function calledCells(spec, z) {
+  if (spec.fields) {
+    return z.map((row, r) => row.map((_, c) => [Math.floor(r / 3), Math.floor(c / 3), spec.fields[r % 3][c % 3]]));
+  }
+  return spec.actions ? z.map((row) => row.map((a) => [a === null ? "" : spec.actions[a]])) : undefined;
+}
+
 function drawFigure(name) {
   const spec = DATA.figures[name];
   const box = document.getElementById(name);
@@ -80,6 +101,8 @@ function drawFigure(name) {
     Object.assign(figure.data[1], plain);
     Object.assign(figure.data[2], off);
   }
+  const map = figure.data.find((one) => one.name === "values" && one.z);
+  if (map) map.customdata = calledCells(spec, map.z);
   const width = box.clientWidth;
   fitLetters(figure, width);
   if (width < NARROW) {
@@ -133,8 +156,18 @@ function rowsOf(spec) {
   const map = spec.data.find((one) => one.name === "values");
   if (map) {
     const at = (axis, i) => (axis ? axis[i] : i);
-    const rows = map.z.flatMap((row, r) => row.map((value, c) => [at(map.y, r), at(map.x, c), value]));
-    return [["row", "column", "value"], rows.filter((one) => one[2] !== null)];
+    const heading = (axis, usual) => (axis.title && axis.title.text) || usual;
+    const places = [heading(spec.layout.yaxis, "row"), heading(spec.layout.xaxis, "column")];
+    const called = calledCells(spec, map.z);
+    const rows = map.z.flatMap((row, r) => row.map((value, c) => {
+      if (spec.fields) return [...called[r][c].slice(0, 2), plain(called[r][c][2]), value];
+      const cell = [at(map.y, r), at(map.x, c)];
+      if (value === null) return [...cell, null];
+      return [...cell, spec.actions ? plain(called[r][c][0]) : value];
+    }));
+    const headings = spec.fields ? [...places, "action", "value"] : [...places, spec.actions ? "action" : "value"];
+    if (spec.fields) rows.sort((one, other) => one[0] - other[0] || one[1] - other[1]); // the fields of a cell together
+    return [headings, rows.filter((one) => one.at(-1) !== null)];
   }
   if (spec.arrows) {
     const columns = spec.arrows.shape[1];

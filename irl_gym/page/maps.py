@@ -27,7 +27,8 @@ MOST_CELLS = 12_000
 """Cells of a map that are drawn; of larger ones every second, third, ... row and column."""
 GROUND = ("open", "blocked", "goal", "hole", "end", "wrong")
 COLOUR_BAR = {"thickness": 11, "outlinewidth": 0, "len": 0.95, "x": 1.02, "tickfont": {"color": "var(--muted)", "size": 11}}
-SIDES = {(-1, 0), (0, 1), (1, 0), (0, -1)}
+SIDES = {(-1, 0), (0, 1), (1, 0), (0, -1), (0, 0)}
+"""Down and right of each field of a cell that is cut up; the one in its middle is for staying."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,24 +118,26 @@ def heat(
     return Panel(name, title, caption + place.thinned, figure, aspect=_aspect(place))
 
 
-def crosses(name: str, title: str, place: Map, R: Matrix, *, caption: str, shown: StateMask) -> Panel:
-    """A reward on steps (S, A): each cell is cut into a field a move; its centre is left free."""
+def crosses(name: str, title: str, place: Map, R: Matrix, actions: tuple[str, ...], *, caption: str, shown: StateMask) -> Panel:
+    """A reward on steps (S, A): each cell is cut into a field a move; its centre is for an action that stays, or free."""
     layout, figure = place.layout, ground(place)
     rows, columns = layout.shape
     at = np.full((3 * rows, 3 * columns), np.nan)
     paid = np.where(place.cells(shown)[..., None], place.cells(R), np.nan)
+    fields = [[""] * 3 for _ in range(3)]
     for a, (down, right) in enumerate(layout.directions):
         at[1 + down :: 3, 1 + right :: 3] = paid[..., a]
+        fields[1 + down][1 + right] = plotted(actions[a])
     low, high = ends(paid, centred=True)
     thirds = (np.arange(3 * max(rows, columns)) - 1) / 3
     figure.add_heatmap(
         z=listed(at, 4), x=listed(thirds[: 3 * columns]), y=listed(thirds[: 3 * rows]), zmin=low, zmax=high,
         colorscale=DIVERGING, name="values", xgap=0.5, ygap=0.5,
         colorbar=COLOUR_BAR,
-        hovertemplate="row %{y:.0f}, column %{x:.0f}: %{z}<extra></extra>",
+        hovertemplate="row %{customdata[0]}, column %{customdata[1]}, %{customdata[2]}: %{z}<extra></extra>",
     )  # fmt: skip
-    _letters(figure, place, centred=np.ones(layout.shape, dtype=bool))
-    return Panel(name, title, caption, figure, aspect=_aspect(place))
+    _letters(figure, place, centred=np.full(layout.shape, not fields[1][1]))
+    return Panel(name, title, caption, figure, aspect=_aspect(place), extra={"fields": fields})
 
 
 def has_crosses(place: Map) -> bool:
@@ -169,9 +172,10 @@ def choices(name: str, title: str, place: Map, actions: np.ndarray, names: tuple
     figure.add_heatmap(
         z=listed(at[::every, ::every]), zmin=-0.5, zmax=n - 0.5, colorscale=scale, name="values", **_spacing(place),
         colorbar={**COLOUR_BAR, "tickvals": list(range(n)), "ticktext": [plotted(one, 16) for one in names]},
-        hovertemplate=_hover(place, "action %{z}"),
+        hovertemplate=_hover(place, "%{customdata[0]}"),
     )  # fmt: skip
-    return Panel(name, title, caption + place.thinned, figure, aspect=_aspect(place))
+    told = {"actions": [plotted(one) for one in names]}
+    return Panel(name, title, caption + place.thinned, figure, aspect=_aspect(place), extra=told)
 
 
 def bits(place: Map, sets: ActionSets, shown: StateMask) -> list[int]:

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from irl_gym.intervals import Interval
 from irl_gym.page.panels import Panel
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
+from irl_gym.page.worlds import levels_of, levels_told
 from irl_gym.page.written import number, percent, score_of
 from irl_gym.pooling import Pool, over_environments
 
@@ -35,13 +34,26 @@ def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) 
     rows = [[key, *(column[key] for column in columns)] for key in columns[0]]
     shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
     lead += "".join(f" {_together(several, score)}" for several, score in over_environments(found))
-    drawn = {called(pool): pool.curve for pool in found if pool.curve is not None} if same else {}
-    return Section("seeds", "Over seeds", lead, [_curves(found[0], drawn)] if drawn else [], "compare", shown)
+    drawn = [pool for pool in found if pool.curve is not None] if same else []
+    return Section("seeds", "Over seeds", lead, [_curves(drawn)] if drawn else [], "compare", shown)
 
 
 def called(pool: Pool) -> str:
     """The runs of a pool by their letters."""
     return f"runs {', '.join(sorted(pool.runs))}"
+
+
+def told(pool: Pool) -> str:
+    """A pool in one line."""
+    n = len(pool.runs)
+    if pool.score is None:
+        return f"{called(pool)}: no score, since not every one of the {n} seeds has one"
+    return f"{called(pool)}: score {spoken(pool.score)}, {averaged(pool)} over {n} seeds"
+
+
+def averaged(pool: Pool) -> str:
+    """What the mean of a pool is."""
+    return "mean" if len(pool.runs) < TRIMMED else "interquartile mean"
 
 
 def spoken(score: Interval | None) -> str:
@@ -74,12 +86,11 @@ def _together(several: Sequence[Pool], score: Interval) -> str:
     return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, with the draws stratified."
 
 
-def _curves(first: Pool, drawn: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Panel:
-    policies = first.first.metrics["policies"]
-    series = {name: (steps, found[:, 0], (found[:, 1], found[:, 2])) for name, (steps, found) in drawn.items()}
-    levels = {"expert": policies["expert"]["value"], "random": policies["random"]["value"]}
+def _curves(drawn: Sequence[Pool]) -> Panel:
+    """The learning curves of pools that have one."""
+    found = {called(pool): pool.curve for pool in drawn if pool.curve is not None}
+    series = {name: (steps, values[:, 0], (values[:, 1], values[:, 2])) for name, (steps, values) in found.items()}
+    levels = levels_of({called(pool): pool.runs for pool in drawn})
     ends = "; ".join(f"{name} end at {number(values[-1])}" for name, (_, values, _) in series.items())
-    caption = (
-        f"Interquartile means with their 95 % intervals (shaded). {ends}; the expert's and random actions' levels are dashed."
-    )
+    caption = f"Interquartile means with their 95 % intervals (shaded): {ends}; {levels_told(levels)}."
     return Panel("seed-curves", "Discounted value over seeds", caption, curves(series, levels, "discounted value"), height=400)

@@ -6,21 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.diagnoses.spoken import flags_of
+from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
 
 GOOD, MUCH = 0.9, 0.05
 """A score that is good, and a share lost by the worst tie that is much."""
+UNKNOWN = "one episode tells no noise"
+"""In place of a standard error that there is none of."""
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
 STAGES_LEAD = (
     "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
     "neither is timed here."
 )
-MOST_STATES = 12
-"""States that a finding lists."""
 
 
 def verdict(run: Run) -> dict[str, Any]:
@@ -128,7 +128,7 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
             yield told[0], f"{counted(n, 'state')}: {told[1]}"
     if "distance" in held:
         yield "Distance to the expert", (
-            f"{number(held['distance'])} in the features; noise alone makes about {number(held.get('distance_error'), 2)}"
+            f"{number(held['distance'])} in the features; {_noise(held.get('distance_error'))}"
         )  # fmt: skip
         yield "Planner", "fell short of the expert" if held.get("fell_short") else "as good as the expert under the reward"
     if "n_features" in held:
@@ -153,8 +153,14 @@ def _why_not(reward: Mapping[str, Any]) -> str:
         where = f" in {counted(n, 'state')}" if n else ""
         return f"no: another action is better by up to {number(worst, 3)}{where}"
     if "regret" in reward:
-        return f"no: the policy planned for it gains {number(reward['regret'], 3)} +- {number(reward['regret_error'], 2)}"
+        error = reward["regret_error"]
+        noise = f"; {UNKNOWN}" if error is None else f" +- {number(error, 2)}"
+        return f"no: the policy planned for it gains {number(reward['regret'], 3)}{noise}"
     return "no"
+
+
+def _noise(error: float | None) -> str:
+    return UNKNOWN if error is None else f"noise alone makes about {number(error, 2)}"
 
 
 def doctor(run: Run) -> Section:
@@ -163,29 +169,22 @@ def doctor(run: Run) -> Section:
     if run.diagnosis is None:
         why = sentence_of(run.stages.get("ambiguity", {}).get("no_diagnosis"))
         return Section("doctor", title, f"The doctor did not look at this run. {why}".strip())
-    findings = [_finding(run, one) for one in run.diagnosis.get("findings", ())]
+    findings = [finding(run, one) for one in run.diagnosis.get("findings", ())]
     lead = "What a careful reader would ask of this reward, and what to do about it."
     if not findings:
         lead = f"The doctor has nothing to complain about. {sentence_of(run.diagnosis.get('examined'))}".strip()
     return Section("doctor", title, lead, (), "doctor", {"findings": findings})
 
 
-def _finding(run: Run, found: Mapping[str, Any]) -> dict[str, Any]:
-    states = list(found.get("states") or ())
-    names = [run.state_name(int(row)) for row in states[:MOST_STATES]] if run.table is not None else []
-    more = f" and {len(states) - MOST_STATES:,} more" if len(states) > MOST_STATES and names else ""
+def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
+    """A finding as diagnosis.json holds it, in words: states and actions by their names, and its mend with flags."""
+    sentence, mend = str(found.get("sentence", "")), str(found.get("mend", ""))
+    flags = usable_flags(found.get("flags") or (), given=run.config.get("dataset") is not None)
     return {
         "name": str(found.get("name", "")).replace("_", " ").replace("-", " "),
-        "sentence": found.get("sentence", ""),
-        "mend": _mend(run, str(found.get("mend", ""))),
-        "states": f"{'; '.join(names)}{more}" if names else "",
+        "sentence": sentence if run.table is None else with_names(sentence, run.state_name, run.actions),
+        "mend": f"{mend} On the command line: {', '.join(flags)}." if flags else mend,
     }
-
-
-def _mend(run: Run, mend: str) -> str:
-    """A mend, with the flags of the command line that it speaks of."""
-    flags = ", ".join(flags_of(mend, given=run.config.get("dataset") is not None))
-    return f"{mend} On the command line: {flags}." if flags else mend
 
 
 def stages(run: Run) -> Section:

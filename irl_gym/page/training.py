@@ -1,7 +1,7 @@
 """The learning curve, and how wide the feasible set leaves each state's reward."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,24 @@ from irl_gym.runs import Run
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
 COLOURS = ("learned", "bad", "expert", "warn", "action4", "action6")
+"""Of the lines of one figure, in turn."""
+
+
+class Level(NamedTuple):
+    """A level line across a figure of curves: what a policy is worth."""
+
+    name: str
+    value: float | None
+    """None where it is not known: there is no line."""
+    colour: str
+    dash: str
+    listed: bool = True
+    """Is it in the legend?"""
+
+
+def usual_levels(expert: float | None, random: float | None) -> tuple[Level, Level]:
+    """The expert, dashed, and random actions, dotted, where there is one of each."""
+    return Level("expert", expert, "expert", "dash"), Level("random", random, "muted", "dot")
 
 
 def learning(run: Run) -> Section:
@@ -42,32 +60,34 @@ def _settled(run: Run) -> str:
 
 
 def _values(curve: Curve, policies: Mapping[str, Any]) -> Panel:
-    levels = {"expert": policies["expert"]["value"], "random": policies["random"]["value"]}
+    expert, random = policies["expert"]["value"], policies["random"]["value"]
+    levels = usual_levels(expert, random)
     figure = curves({"retrained agent": (curve.steps, curve.value, None)}, levels, "discounted value from the start")
     caption = (
         f"Discounted value under the true reward, ending at {number(curve.value[-1])}; the expert has "
-        f"{number(levels['expert'])}, random actions {number(levels['random'])}."
+        f"{number(expert)}, random actions {number(random)}."
     )
     return Panel("curve-value", "Value", caption, figure)
 
 
 def _returns(curve: Curve, policies: Mapping[str, Any]) -> Panel:
-    levels = {"expert": policies["expert"]["mean_return"], "random": policies["random"]["mean_return"]}
+    expert, random = policies["expert"]["mean_return"], policies["random"]["mean_return"]
     band = (curve.low, curve.high)
+    levels = usual_levels(expert, random)
     figure = curves({"retrained agent": (curve.steps, curve.mean, band)}, levels, "mean return of episodes")
     caption = (
         f"Mean undiscounted return of sampled episodes with its 95 % interval (shaded), {spread(curve.mean)}; the expert has "
-        f"{number(levels['expert'])}, random actions {number(levels['random'])}."
+        f"{number(expert)}, random actions {number(random)}."
     )
     return Panel("curve-return", "Mean return", caption, figure)
 
 
 def curves(
     series: Mapping[str, tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray] | None]],
-    levels: Mapping[str, float | None],
+    levels: Sequence[Level],
     ylabel: str,
 ) -> Any:
-    """Lines over environment steps, with bands where there are intervals, and dashed levels."""
+    """Lines over environment steps, with bands where there are intervals, and levels."""
     figure = blank(
         xaxis=axis(title={"text": "environment steps"}, separatethousands=True, rangemode="tozero"),
         yaxis=axis(title={"text": ylabel}), showlegend=True, legend=below(), margin={"l": 8, "r": 12, "t": 44, "b": 8},
@@ -86,11 +106,12 @@ def curves(
             line={"color": f"var(--{colour})", "width": 2}, marker={"size": 4},
             hovertemplate="%{x:,} steps: %{y}",
         )  # fmt: skip
-    for (name, level), colour in zip(levels.items(), ("expert", "muted"), strict=False):
-        if level is not None:
+    for level in levels:
+        if level.value is not None:
             figure.add_scatter(
-                x=[0, last], y=[level, level], mode="lines", name=f"{plotted(name)} {number(level)}", hoverinfo="skip",
-                line={"color": f"var(--{colour})", "dash": "dash", "width": 2},
+                x=[0, last], y=[level.value] * 2, mode="lines", name=f"{plotted(level.name)} {number(level.value)}",
+                hoverinfo="skip", showlegend=level.listed,
+                line={"color": f"var(--{level.colour})", "dash": level.dash, "width": 2},
             )  # fmt: skip
     return figure
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from models import paper_grid, random_model, ring
 from patients import contradicted, corridor, finding, judged, names, right
 
@@ -18,8 +19,11 @@ def test_a_price_above_lambda_0_is_named_with_lambda_0():
     assert "l1 is 5" in said.sentence and "lambda_0 is 1.055" in said.sentence
 
 
-def test_a_price_above_lambda_0_is_all_that_is_wrong():
-    assert names(FiniteLP(l1=5.0).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert) == ("lambda-above-lambda-0",)
+@pytest.mark.parametrize("solver", ["highs", "clarabel"])
+@pytest.mark.parametrize("margin_cap", ["auto", None])
+def test_a_price_above_lambda_0_is_all_that_is_wrong(margin_cap, solver):
+    dear = FiniteLP(l1=500.0, margin_cap=margin_cap, solver=solver).fit(GRID.mdp, GRID.expert)
+    assert names(dear, GRID.mdp, GRID.expert) == ("lambda-above-lambda-0",)
 
 
 def test_lambda_0_is_computed_where_the_certificate_lacks_it():

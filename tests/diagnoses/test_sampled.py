@@ -7,9 +7,11 @@ import pytest
 from models import paper_grid
 from patients import finding, names, sampled
 
+from irl_gym.diagnosis import doctor
 from irl_gym.learners.feature import FeatureLP
 
 GRID = paper_grid()
+PLANNERS = ("SB3", "ValueIteration")
 FEW = np.random.default_rng(0).normal(size=(25, 2))
 
 
@@ -36,6 +38,18 @@ def test_small_standard_errors_are_no_finding():
 
 def test_trajectories_in_which_nothing_is_wrong_are_healthy():
     assert names(sampled(), None, None) == ()
+
+
+@pytest.mark.parametrize("regret", [-1.0, 1.0])
+def test_one_episode_is_told_to_tell_no_noise(regret):
+    errors = {"gap_errors": np.full(2, np.nan), "regret_error": np.nan, "regret": regret}
+    made = doctor(sampled(**errors, stats={"expert_episodes": 1}), None, None)
+    assert made.names == ("too-few-trajectories",) and "One episode tells no noise" in made.findings[0].sentence
+
+
+def test_an_exact_inner_planner_is_given_no_flags():
+    told = [finding("planner-fell-short", sampled(regret=-1.0, stats={"inner": inner}), None, None) for inner in PLANNERS]
+    assert [one.flags for one in told] == [("--total-timesteps",), ()]
 
 
 @pytest.mark.parametrize(

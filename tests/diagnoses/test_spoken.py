@@ -1,46 +1,50 @@
 """What the doctor says to who does not write Python."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+import tyro
 
-from irl_gym.diagnoses.spoken import VALUED, WORDS, flags_of, with_names
+import irl_gym.diagnoses
+from irl_gym.arguments import Arguments
+from irl_gym.diagnoses.spoken import RECORDING, usable_flags, with_names
+from irl_gym.terminal import OPTIONS
 
-SCRIPT = Path(__file__).parents[2] / "scripts" / "recover_and_retrain.py"
+CHOSEN = {
+    "--episodes": "50", "--epsilon": "0.1", "--features": "radial", "--gamma": "0.9", "--rounds": "9",
+    "--total-timesteps": "1000", "--shaping": "",
+}  # fmt: skip
+"""What a reader may choose for flags that are said without a value."""
+SAID = sorted(
+    {
+        flag
+        for file in Path(irl_gym.diagnoses.__path__[0]).glob("*.py")
+        for flag in re.findall(r'"(--[^"]*)"', file.read_text())
+        if file.name != "spoken.py"
+    }
+)
+"""Every flag in the source of the checks; {...} stands for a number."""
 
 
-@pytest.mark.parametrize(
-    ("mend", "flags"),
-    [
-        ('margin_cap="auto" with l1=0.0, and reward_on="state-action" where that leaves them.',
-         ("--margin-cap auto", "--l1 0", "--reward-on state-action")),
-        ('l1="auto", just below lambda_0, or a number below 12.93; l1=0.0 for the rest.', ("--l1 auto", "--l1 0")),
-        ("l1=0.0 first; then raise it slowly.", ("--l1 0",)),
-        ('reward_on="state-action" explains it; or slack=10.0, which finds.', ("--reward-on state-action", "--slack 10")),
-        ("Nothing, if these are errors: slack=0.5 gives them up.", ("--slack 0.5",)),
-        ("FiniteLP() with its defaults: it finds one.", ("--learner finite-lp --l1 0 --margin-cap auto",)),
-        ("More or other features; a larger S_0; or FiniteLP.", ("--features", "--learner finite-lp")),
-        ("A stronger `inner` planner: more total_timesteps.", ("--inner", "--total-timesteps")),
-        ("A larger gamma: at 0.9 it no longer is.", ("--gamma",)),
-        ("Read its error.", ()),
-    ],
-)  # fmt: skip
-def test_a_mend_names_its_flags(mend, flags):
-    assert flags_of(mend) == flags
+def typed(flag):
+    """A flag as a person types it."""
+    number = re.sub(r"\{[^}]*\}", "0.5", flag)
+    return [*number.split(), *CHOSEN[flag].split()] if " " not in flag else number.split()
+
+
+@pytest.mark.parametrize("flag", [*SAID, *(one for one in RECORDING if one != "--expert")])
+def test_a_flag_is_one_that_the_loop_takes(flag):
+    assert isinstance(tyro.cli(Arguments, args=typed(flag), config=OPTIONS), Arguments)
+
+
+def test_the_checks_say_flags():
+    assert {"--l1 auto", "--reward-on state-action", "--episodes", "--slack {10 * slack:g}"} <= set(SAID)
 
 
 def test_a_run_from_a_dataset_is_told_no_flag_for_other_episodes():
-    mend = "More episodes; more start_seeds, or an expert with some noise (epsilon)."
-    assert flags_of(mend) == ("--episodes", "--start-seeds", "--epsilon") and flags_of(mend, given=True) == ()
-
-
-def test_every_flag_exists():
-    told = subprocess.run([sys.executable, str(SCRIPT), "--help"], capture_output=True, text=True, timeout=120).stdout
-    known = set(re.findall(r"--[a-z][-a-z0-9]*", told))
-    assert set(re.findall(r"--[a-z][-a-z0-9]*", " ".join([*VALUED.values(), *WORDS.values()]))) <= known
+    flags = ("--episodes", "--epsilon", "--expert value-iteration", "--l1 0")
+    assert usable_flags(flags) == flags and usable_flags(flags, given=True) == ("--l1 0",)
 
 
 def test_states_and_actions_get_their_names_behind_them():

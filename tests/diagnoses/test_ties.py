@@ -1,5 +1,7 @@
 """Actions that the reward leaves as good as the expert's, or better."""
 
+from dataclasses import replace
+
 import numpy as np
 from models import paper_grid
 from patients import finding, judged, names, partly_contradicted
@@ -8,6 +10,7 @@ from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.learners.finite import FiniteLP
 
 GRID = paper_grid()
+CAPPED = ("--margin-cap auto", "--l1 0")
 ZERO = np.zeros(5, dtype=int)
 
 
@@ -30,13 +33,23 @@ def test_violations_that_slack_bought_are_told_as_possible_errors():
     table = partly_contradicted()
     result = FiniteLP(slack=10.0).fit(table, ZERO, visits=np.array([99.0, 99.0, 99.0, 1.0, 99.0]))
     said = finding("expert-not-optimal", result, table, ZERO)
-    assert said.states.tolist() == [3] and "the expert's errors" in said.mend
+    assert said.states.tolist() == [3] and "the expert's errors" in said.mend and said.flags == ("--slack 100",)
 
 
 def test_ties_that_another_reward_breaks_are_told(toy_text):
     mdp, expert, _ = lake(toy_text)
     said = finding("avoidable-ties", FiniteLP(margin_cap=None).fit(mdp, expert), mdp, expert)
     assert 'margin_cap="auto"' in said.mend and said.states.size
+
+
+def test_a_mend_of_ties_is_not_what_the_run_has(toy_text):
+    mdp, expert, _ = lake(toy_text)
+    free, best = FiniteLP(margin_cap=None).fit(mdp, expert), FiniteLP().fit(mdp, expert)
+    soft = replace(free, certificate=replace(free.certificate, slack=1.0))
+    same = replace(best, reward=free.reward)
+    said = [finding("avoidable-ties", one, mdp, expert) for one in (free, soft, same)]
+    assert [one.flags for one in said] == [CAPPED, ("--slack none", *CAPPED), ()]
+    assert "same settings" in said[2].mend
 
 
 def test_a_cap_on_margins_mends_avoidable_ties(toy_text):

@@ -44,7 +44,8 @@ def test_a_sampled_reward_that_leads_where_the_expert_never_was_is_told():
 
 
 def test_the_states_that_a_policy_enters_are_those_its_actions_lead_to():
-    assert entered(ring([[1, 2], [0, 0], [2, 2]]), np.eye(2, dtype=bool)[[0, 0, 0]]).all()  # every state is a start
+    fork = TabularMDP(ring([[1, 2], [0, 0], [2, 2]]).P, 0.9, np.eye(3)[0])
+    assert entered(fork, np.eye(2, dtype=bool)[[0, 0, 0]]).tolist() == [True, True, False]
     mdp = corridor(5, 0.9)
     taken = np.eye(2, dtype=bool)[right(mdp)]
     taken[2] = False

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -54,6 +55,18 @@ def test_the_certificate_is_json(result):
     told = json.loads(json.dumps(result.certificate.to_json()))
     assert told["distance"] == result.certificate.distance and told["gaps"] == result.certificate.gaps.tolist()
     assert {"expert_optimal", "duality_gap", "degenerate", "truncation", "horizon", "rank"} <= set(told)
+
+
+def test_a_record_is_json_when_one_episode_tells_no_error(world, episodes):
+    one = TrajectoryLP(OneHot(48), trajectories=50, max_rounds=2).fit(world, episodes[:1])
+    record = one.record()
+    assert np.isnan(one.stats["regret_error"]) and record["stats"]["regret_error"] is None
+    assert record["stats"]["rounds"][0]["regret_error"] is None and json.loads(json.dumps(record, allow_nan=False)) == record
+
+
+def test_sampled_values_are_compared_as_they_are_when_one_episode_tells_no_error(result):
+    unsure = replace(result.certificate, gaps=np.ones(1), gap_errors=np.full(1, np.nan), regret_error=np.nan, regret=-0.5)
+    assert unsure.expert_optimal and not replace(unsure, regret=0.5).expert_optimal
 
 
 @pytest.mark.parametrize("word", ["expert best under R      yes", "distance to the expert", "cut after 44 steps", "have rank"])

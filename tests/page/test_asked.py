@@ -5,7 +5,7 @@ from dataclasses import replace
 from page.made_runs import table_run
 
 from irl_gym.page.asked import asked, typed
-from irl_gym.page.proof import doctor, verdict
+from irl_gym.page.proof import doctor, finding, verdict
 
 SCRIPT = ("python", "scripts/recover_and_retrain.py")
 
@@ -17,6 +17,11 @@ def test_only_what_was_typed_is_listed(tmp_path):
 
 def test_flags_with_an_equals_sign_are_read_too():
     assert list(typed([*SCRIPT, "--gamma=0.9", "--out=x", "--seed", "3"])) == [("--gamma", "0.9"), ("--seed", "3")]
+
+
+def test_flags_with_underscores_are_read_as_the_help_spells_them():
+    command = [*SCRIPT, "--env_id", "FrozenLake-v1", "--env_kwargs", "is_slippery=false", "--margin_cap=none", "--out", "x_y"]
+    assert list(typed(command)) == [("--env-kwargs", "is_slippery=false"), ("--margin-cap", "none")]
 
 
 def test_the_bare_command_lists_the_environment_alone(tmp_path):
@@ -41,6 +46,11 @@ def test_the_verdict_says_why_there_is_no_score(tmp_path):
 
 def test_the_doctors_mends_name_their_flags(tmp_path):
     run = table_run(tmp_path, films=False)
-    found = {"name": "ties", "sentence": "Tied.", "mend": 'margin_cap="auto" with l1=0.0.', "states": [], "actions": []}
+    found = {"name": "ties", "sentence": "Tied in s=6 a=2.", "mend": "Capped.", "flags": ["--margin-cap auto", "--l1 0"]}
     (told,) = doctor(replace(run, diagnosis={"healthy": False, "findings": [found]})).shown["findings"]
-    assert told["mend"].endswith("On the command line: --margin-cap auto, --l1 0.")
+    assert told["mend"] == "Capped. On the command line: --margin-cap auto, --l1 0."
+
+
+def test_the_doctors_sentences_name_states_and_actions(tmp_path):
+    told = finding(table_run(tmp_path, films=False), {"name": "ties", "sentence": "Tied in s=6 a=2.", "states": [6]})
+    assert told == {"name": "ties", "sentence": "Tied in s=6 a=2 (row 1, column 2; right).", "mend": ""}

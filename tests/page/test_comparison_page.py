@@ -1,10 +1,14 @@
 """compare.html in a real browser: two and three runs, of one environment and of several."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 from page.made_runs import stepped_run, table_run
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, RunIncomplete
 from irl_gym.page.comparison import write_comparison
+from irl_gym.page.proof import doctor
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +72,55 @@ def test_the_same_runs_make_the_same_bytes(pages, runs, tmp_path):
 def test_a_comparison_of_too_few_or_too_many_is_refused(runs, tmp_path, n):
     with pytest.raises(InvalidParameter, match=f"runs has {n}"):
         write_comparison([runs["lake"]] * n, tmp_path / "none.html")
+
+
+def with_doctor(run, diagnosis):
+    return replace(run, diagnosis=diagnosis)
+
+
+HEALTHY = {"healthy": True, "findings": []}
+
+
+@pytest.mark.parametrize(
+    ("diagnoses", "told"),
+    [
+        ([None, None], "The doctor did not look at runs A, B."),
+        ([HEALTHY, None], "The doctor did not look at run B. The doctor has nothing to complain about in the others."),
+        ([HEALTHY, HEALTHY], "The doctor has nothing to complain about in these runs."),
+    ],
+)
+def test_a_run_that_no_doctor_looked_at_is_named(runs, tmp_path, diagnoses, told):
+    write_comparison([with_doctor(runs["lake"], one) for one in diagnoses], tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text()
+    assert f'<p class="lead">{told}</p>' in text
+
+
+def test_the_doctor_says_of_a_run_what_its_own_page_says(runs, tmp_path):
+    found = {"name": "few-episodes", "sentence": "Tied in s=1 a=0.", "mend": "More episodes.", "flags": ["--episodes"]}
+    ill = with_doctor(runs["lake"], {"healthy": False, "findings": [found]})
+    write_comparison([ill, runs["priced"]], tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text()
+    (own,) = doctor(ill).shown["findings"]
+    assert f"<h3>run A: {own['name']}</h3>" in text and own["sentence"] in text and own["mend"] in text
+    assert own["sentence"].endswith("(row 0, column 1; left).") and "--episodes" in own["mend"]
+
+
+def test_a_run_in_the_folder_that_one_is_in_has_that_folders_name(runs, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    write_comparison([replace(runs["lake"], path=Path(".")), runs["priced"]], tmp_path / "a.html")
+    assert "seed 0 (here)" in (tmp_path / "a.html").read_text()
+
+
+@pytest.mark.parametrize("damage", [{"policies": {}}, {"reward": "good"}])
+def test_the_run_that_cannot_be_understood_is_named_alone(runs, tmp_path, damage):
+    damaged = replace(runs["priced"], metrics={**runs["priced"].metrics, **damage}, path=Path("theirs/damaged"))
+    with pytest.raises(RunIncomplete, match=r"^theirs/damaged cannot be understood"):
+        write_comparison([runs["lake"], damaged, runs["cliff"]], tmp_path / "a.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_runs_of_one_environment_are_not_ranked_when_their_tables_differ(runs, tmp_path):
+    lake = runs["lake"]
+    write_comparison([lake, replace(lake, config={**lake.config, "bins": 9})], tmp_path / "a.html")
+    assert "The environments differ" in (tmp_path / "a.html").read_text()

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from page.made_runs import stepped_run, table_run
 
-from irl_gym.page.asked import into_new_folder
+from irl_gym.claims import into_new_folder
 from irl_gym.page.compared import policies, values
-from irl_gym.page.comparison import run_places, write_comparison
+from irl_gym.page.comparison import write_comparison
 from irl_gym.page.episodes import episodes
 from irl_gym.page.proof import certificate, doctor, verdict
 from irl_gym.page.scene import Scene
 from irl_gym.page.slider import lambda_slider
 from irl_gym.page.training import widths
+from irl_gym.page.worlds import run_places
 from irl_gym.page.written import aligned, percent, score_of, state_called
 
 

@@ -1,5 +1,6 @@
 """The script as a person runs it, by subprocess."""
 
+import json
 import shutil
 
 import pytest
@@ -36,3 +37,33 @@ def test_a_page_in_a_folder_that_does_not_exist_is_refused(script, finished):
 def test_a_folder_that_is_no_run_is_named(script, finished):
     made = script("compare", "plain", "nowhere", cwd=finished)
     assert made.returncode == 2 and "RunIncomplete: nowhere" in made.stderr and "Traceback" not in made.stderr
+
+
+def test_the_one_damaged_run_of_many_is_named_alone(script, finished):
+    shutil.copytree(finished / "plain", finished / "damaged", dirs_exist_ok=True)
+    (finished / "damaged" / "metrics.json").write_text('{"policies": [], "table": {"states": 16}, "reward": "good"}')
+    made = script("compare", "plain", "priced", "damaged", cwd=finished)
+    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: damaged cannot be understood"), made.stderr
+
+
+def test_json_that_is_nested_too_deeply_gets_one_clear_line(script, finished):
+    shutil.copytree(finished / "plain", finished / "deep", dirs_exist_ok=True)
+    (finished / "deep" / "certificate.json").write_text('{"a":' * 100_000)
+    made = script("compare", "plain", "deep", cwd=finished)
+    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: deep is incomplete: certificate.json cannot be read")
+    assert made.stderr.count("\n") == 1
+
+
+def test_seeds_of_one_setting_are_told_together(script, finished):
+    for seed in (0, 1):
+        shutil.copytree(finished / "plain", finished / f"seed{seed}", dirs_exist_ok=True)
+        config = finished / f"seed{seed}" / "config.json"
+        config.write_text(json.dumps({**json.loads(config.read_text()), "seed": seed}))
+    made = script("compare", "seed0", "seed1", cwd=finished)
+    line, wrote = made.stdout.splitlines()
+    assert line == "runs A, B: score 1.000 (1.000 to 1.000), mean over 2 seeds" and wrote.startswith("Wrote compare.html")
+
+
+def test_runs_that_are_no_seeds_of_one_setting_are_told_apart(script, finished):
+    made = script("compare", "plain", "priced", "--out", "both.html", cwd=finished)
+    assert made.stdout == "Wrote both.html: 2 runs side by side.\n"

@@ -1,16 +1,19 @@
 """The script as a person runs it, on runs that went well, badly, and not to their end."""
 
 import re
+import runpy
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
 from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
 from irl_gym.runs import read_run
@@ -63,6 +66,24 @@ def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(runs, tmp_path)
 def test_a_folder_without_a_run_exits_with_2(tmp_path):
     done = doctor(tmp_path)
     assert done.returncode == 2 and "holds no run" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_folder_that_may_not_be_read_gets_one_clear_line(monkeypatch, tmp_path, capsys):
+    def refused(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    script = runpy.run_path(str(SCRIPT))
+    monkeypatch.setitem(script["main"].__globals__, "read_run", refused)
+    assert script["main"](script["Arguments"](tmp_path)) == 2
+    assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path}'\n"
+
+
+def test_one_episode_is_judged_and_told_to_tell_no_noise(tmp_path):
+    learner = TrajectoryLP(np.eye(16), trajectories=100, max_rounds=2)
+    asked = Experiment("FrozenLake-v1", 0.99, learner=learner, retrain=ValueIteration(), episodes=1, eval_episodes=5)
+    made = recover_and_retrain(asked, tmp_path / "one")
+    assert read_run(made.out).stages["reward"]["stats"]["regret_error"] is None
+    assert "One episode tells no noise" in doctor(made.out).stdout and "one episode tells no noise" in made.page.read_text()
 
 
 def test_an_expert_with_noise_is_judged_by_what_its_episodes_show(runs):

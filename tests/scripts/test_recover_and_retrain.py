@@ -2,6 +2,7 @@
 
 import json
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -133,6 +134,16 @@ def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):
     (held,) = sorted((finished[1] / "runs").iterdir())[:1]
     made = run("--out", str(held), "--seed", "7", cwd=tmp_path)
     assert made.returncode == 2 and "RunConflict" in made.stderr
+
+
+def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_path, capsys):
+    def refused(*_):
+        raise PermissionError(13, "Permission denied", str(tmp_path / ".lock"))
+
+    script = runpy.run_path(str(SCRIPT))
+    monkeypatch.setitem(script["main"].__globals__, "recover_and_retrain", refused)
+    assert script["main"](script["Arguments"](out=tmp_path), []) == 2
+    assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'\n"
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):

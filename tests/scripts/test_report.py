@@ -41,9 +41,17 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     (copied / "run" / "metrics.json").write_text(json.dumps({"policies": [], "table": {"states": 16}, "reward": "good"}))
     made = script(name, "--run", "run", cwd=copied)
     assert "Traceback" not in made.stderr and made.stderr.count("\n") <= 1
-    assert name == "doctor" or (made.returncode == 2 and made.stderr.startswith("RunIncomplete: run cannot be understood"))
+    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: run cannot be understood")
 
 
 def test_a_page_that_cannot_be_written_gets_one_clear_line(script, planned, tmp_path):
     made = script("report", "--run", planned / "plain", "--out", tmp_path / "none" / "a.html", cwd=tmp_path)
     assert made.returncode == 2 and f"there is no folder {tmp_path / 'none'}" in made.stderr and "Traceback" not in made.stderr
+
+
+def test_a_folder_of_the_page_s_own_name_gets_one_clear_line_and_leaves_nothing(script, copied):
+    (copied / "run" / "report.html").unlink()
+    (copied / "run" / "report.html").mkdir()
+    made = script("report", "--run", "run", cwd=copied)
+    assert made.returncode == 2 and "report.html is a folder: expected a file" in made.stderr and made.stderr.count("\n") == 1
+    assert not (copied / "run" / ".report.html.tmp").exists()

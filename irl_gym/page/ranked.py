@@ -1,0 +1,85 @@
+"""Which of several runs is best, in a sentence, and their learning curves in one figure.
+
+Runs are ranked by score only where a score is as much in one as in another: in one world, with experts and random actions that
+are worth the same. Curves are of values in one world, and of scores elsewhere.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from irl_gym.page.panels import Panel
+from irl_gym.page.pooled import averaged, spoken
+from irl_gym.page.sections import Section
+from irl_gym.page.training import curves, usual_levels
+from irl_gym.page.worlds import agree, levels_of, levels_told, one_scale, one_world, worth
+from irl_gym.page.written import number, score_of, sentence_of
+from irl_gym.pooling import Pool
+from irl_gym.runs import Run
+
+TITLE = "Learning curves"
+
+
+def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
+    """Which agent is best, by score; of runs that only differ in their seed, how good they are together."""
+    scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
+    known = {letter: score for letter, score in scores.items() if score is not None}
+    if not known:
+        return "None of these runs has a score; each run's own page says why."
+    if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
+        expert = "the expert" if one_scale(named) else "the own expert of each"
+        return (
+            f"Over {len(named)} seeds the retrained agents have a score of {spoken(found[0].score)}, the {averaged(found[0])} "
+            f"with its 95 % interval. Random actions are 0, {expert} is 1."
+        )
+    if not one_scale(named):
+        each = "; ".join(f"run {letter} {score_of(score)}" for letter, score in scores.items())
+        return (
+            f"Scores of the retrained agents: {each}. Random actions are 0, the expert is 1. {_unlike(named)}, so a score says "
+            "how near each agent comes to its own expert, not which run is better."
+        )
+    best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
+    if score_of(known[best]) == score_of(known[worst]):
+        return f"The retrained agents are equally good, with a score of {score_of(known[best])}."
+    return (
+        f"The retrained agent of run {best} has the best score, {score_of(known[best])}; that of run {worst} the worst, "
+        f"{score_of(known[worst])}. Random actions are 0, the expert is 1."
+    )
+
+
+def _unlike(named: Mapping[str, Run]) -> str:
+    """Why scores are not on one scale."""
+    if not one_world(named):
+        return "The environments differ"
+    apart = "random actions are" if agree(worth(named, "expert")) else "the experts are"
+    return f"In these runs {apart} not worth the same"
+
+
+def learning(named: Mapping[str, Run]) -> Section:
+    """All learning curves in one figure."""
+    trained = {letter: run for letter, run in named.items() if len(run.curve.steps)}
+    if not trained:
+        return Section("learning", TITLE, "The agents were planned exactly, not trained.")
+    if one_world(named):
+        series = {f"run {letter}": (run.curve.steps, run.curve.value, None) for letter, run in trained.items()}
+        levels = levels_of({f"run {letter}": {letter: run} for letter, run in trained.items()})
+        what, told = "discounted value from the start", levels_told(levels)
+    else:
+        series = {f"run {letter}": curve for letter, run in trained.items() if (curve := _scores(run)) is not None}
+        levels, what, told = [*usual_levels(1.0, 0.0)], "score", "random actions are 0, the expert is 1"
+    if not series:
+        return Section("learning", TITLE, "No run has a score to draw.")
+    ends = "; ".join(f"{name} ends at {number(values[-1])}" for name, (_, values, _) in series.items())
+    panel = Panel("curves", what.capitalize(), sentence_of(f"{ends}; {told}"), curves(series, levels, what), height=400)
+    left = [letter for letter in named if f"run {letter}" not in series]
+    lead = "What each agent earned under the true reward as it trained."
+    lead += f" Without a curve, as planned exactly or without a score: {', '.join(left)}." if left else ""
+    return Section("learning", TITLE, lead, [panel])
+
+
+def _scores(run: Run) -> tuple[np.ndarray, np.ndarray, None] | None:
+    """A learning curve in scores; None where the expert is no better than random actions."""
+    low, high = (run.metrics["policies"][policy]["value"] for policy in ("random", "expert"))
+    if low is None or high is None or not high > low:
+        return None
+    return run.curve.steps, (run.curve.value - low) / (high - low), None

@@ -57,7 +57,7 @@ class Face:
     @property
     def width(self) -> np.ndarray:
         """(S,) or (S, A) high - low: 0 where all optima agree."""
-        return self.high - self.low
+        return self.high - self.low + 0.0  # not -0
 
     @property
     def unique(self) -> bool:

@@ -18,12 +18,17 @@ from irl_gym.runs import Run
 
 WORLD = ("gamma", "start_seeds", "reveal", "bins", "samples", "table")
 """Entries of a configuration that make another world of an environment."""
+SHORT = 20
+"""Characters of an argument that is told even if it is the same in all runs."""
 SAME = 1e-6
 """Values whose difference is below this share of the largest are the same: planners stop before that."""
 
 
 def run_places(named: Mapping[str, Run]) -> dict[str, str]:
-    """What the environment of each run is called: its id, with what is given where runs of one id differ in it."""
+    """What the environment of each run is called: its id, with short arguments, and whatever runs of one id differ in."""
+    short = {
+        key for run in named.values() for key, one in (run.config.get("env_kwargs") or {}).items() if len(written(one)) <= SHORT
+    }
     given = {letter: dict(_given(run.config)) for letter, run in named.items()}
     told = {}
     for letter, run in named.items():
@@ -31,7 +36,7 @@ def run_places(named: Mapping[str, Run]) -> dict[str, str]:
         keys = [
             key
             for key in dict.fromkeys(key for one in same for key in one)
-            if any(one.get(key) != same[0].get(key) for one in same)
+            if key in short or any(one.get(key) != same[0].get(key) for one in same)
         ]
         differing = ", ".join(f"{key}={written(given[letter][key])}" for key in keys if key in given[letter])
         told[letter] = page_title(run) + (f" ({differing or 'no arguments'})" if keys else "")

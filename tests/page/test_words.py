@@ -136,7 +136,13 @@ def test_lakes_of_two_maps_are_told_apart(lake, tmp_path):
     small = table_run(tmp_path / "small", map_name="4x4", films=False)
     plain = replace(lake, config={**lake.config, "env_kwargs": {}})
     assert run_places({"A": plain, "B": small}) == {"A": "FrozenLake-v1 (no arguments)", "B": "FrozenLake-v1 (map_name=4x4)"}
-    assert run_places({"A": small, "B": small}) == {"A": "FrozenLake-v1", "B": "FrozenLake-v1"}
+    assert run_places({"A": small, "B": small}) == dict.fromkeys("AB", "FrozenLake-v1 (map_name=4x4)")
+
+
+def test_a_long_argument_is_told_only_where_runs_differ_in_it(lake):
+    drawn = replace(lake, config={**lake.config, "env_kwargs": {"desc": ["SFFFFFFF", "FFFFFFFG"]}})
+    assert run_places({"A": drawn, "B": drawn}) == dict.fromkeys("AB", "FrozenLake-v1")
+    assert run_places({"A": drawn, "B": lake})["A"] == 'FrozenLake-v1 (desc=["SFFFFFFF", "FFFFFFFG"])'
 
 
 def test_no_agent_is_best_across_environments(lake, tmp_path):

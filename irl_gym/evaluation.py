@@ -10,8 +10,9 @@ import numpy as np
 from irl_gym import metrics
 from irl_gym._typing import ActionSets, Matrix
 from irl_gym.curves import Curve, read_curve
+from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import policy_iteration, tied
-from irl_gym.errors import NotTabular
+from irl_gym.errors import NotTabular, UndefinedDistance
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import support
@@ -169,10 +170,24 @@ def _reward(loop: "Loop", scale: Scale) -> dict[str, Any]:
             "worst_tie_value": value,
             "worst_tie_regret": scale.expert - value,
             "worst_tie_regret_share": scale.share(scale.expert - value),
+            **_apart(world.table.mdp, world.table.reward, world.tabular(loop.learned)),
         }
     stats = loop.stage("reward")["stats"]
     rounds = {"rounds": len(stats["rounds"])} if "rounds" in stats else {}
     return told | rounds | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
+
+
+def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict[str, float | None]:
+    """Distances of the learned reward from the true one, where episodes go; None where one is not defined."""
+    rows = np.flatnonzero(mdp.reachable)
+    part, pair = mdp.restrict(rows), [reward.values[rows] for reward in (true, learned)]
+    told: dict[str, float | None] = {}
+    for name, distance in (("starc", starc), ("epic", epic)):
+        try:
+            told[name] = distance(part, *pair)
+        except UndefinedDistance:
+            told[name] = None
+    return told
 
 
 STATE_LISTS = ("inseparable", "marginless", "unconstrained", "unknown", "violated")

@@ -179,6 +179,9 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
         yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
     if "worst_tie_regret" in reward:
         yield "worst-tie regret", _worst_tie(reward)
+    known = [f"{name} {reward[key]:.2f}" for name, key in (("STARC", "starc"), ("EPIC", "epic")) if reward.get(key) is not None]
+    if known:
+        yield "distance from the true one", f"{', '.join(known)} (0: ranks policies alike, 0.71: unrelated)"
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )

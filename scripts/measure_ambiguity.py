@@ -42,16 +42,16 @@ def first_experiment() -> tuple[TabularMDP, np.ndarray, np.ndarray]:
 
 
 def of_widths() -> Iterator[Row]:
-    """400 states: bar 60 s on 2 cores."""
-    cases = (0.9, 2, "default"), (0.99, 1, "default"), (0.99, 2, "default"), (0.99, 2, "(4) alone"), (0.99, 2, "steps")
-    for gamma, workers, asked in cases:
-        mdp, expert = grid(20, gamma)
+    """400 states: bar 60 s on 2 cores. And 900, where a second process pays."""
+    cases = [(20, 0.9, 1, "default"), *((20, 0.99, workers, asked) for asked in ASKED for workers in (1, 2))]
+    for size, gamma, workers, asked in [*cases, (30, 0.99, 1, "default"), (30, 0.99, 2, "default")]:
+        mdp, expert = grid(size, gamma)
         begin = time.perf_counter()
         found = feasible_widths(mdp, expert, workers=workers, **ASKED[asked])
         seconds = f"{time.perf_counter() - begin:.1f} s"
         width = found.width[np.isfinite(found.width)]
         spread = f"{width.min():.3f} / {np.median(width):.3f} / {width.max():.3f}"
-        yield f"20 x 20, gamma {gamma}", asked, str(workers), seconds, spread
+        yield f"{size} x {size}, gamma {gamma}", asked, str(workers), seconds, spread
 
 
 def of_faces() -> Iterator[Row]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from irl_gym.datasets import minari_root
+from irl_gym.distances import epic, starc
 from irl_gym.errors import DegenerateExpert, InvalidParameter, NotDiscrete, RunConflict, UnknownEnvironment
 from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
@@ -53,6 +54,15 @@ def test_the_retrained_agent_is_as_good_as_the_expert(report):
 def test_the_scale_of_the_score_is_set_by_random_and_expert(report):
     policies = report.metrics["policies"]
     assert (policies["random"]["score"], policies["expert"]["score"]) == (0.0, 1.0)
+
+
+def test_the_distances_of_the_rewards_are_those_where_episodes_go(report):
+    """FrozenLake 4x4 has no cell that no episode visits."""
+    table = Loop(small(), report.out).world.table
+    learned, told = TabularReward.load(report.out / "reward.npz"), report.metrics["reward"]
+    assert table.mdp.reachable.all()
+    assert told["starc"] == pytest.approx(starc(table.mdp, table.reward, learned)) and 0 < told["starc"] < 1
+    assert told["epic"] == pytest.approx(epic(table.mdp, table.reward, learned)) and 0 < told["epic"] < 1
 
 
 def test_the_expert_agrees_with_its_own_set(report):

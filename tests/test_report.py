@@ -103,3 +103,11 @@ def test_a_curve_has_settled_after_the_last_time_that_it_was_below(good, steps):
 
 def test_a_curve_that_ends_below_has_not_settled():
     assert settled_at(CURVE[:3], 0.0, 1.0) is None
+
+
+def test_the_distance_of_the_rewards_is_told_where_it_is_known(tmp_path):
+    assert "distance from the true one │ STARC 0.68, EPIC 0.71 (0: ranks policies alike" in said(
+        tmp_path, starc=0.684, epic=0.706
+    )
+    assert "distance from the true one │ STARC 0.50 (0:" in said(tmp_path, starc=0.5, epic=None)
+    assert "distance from" not in said(tmp_path)

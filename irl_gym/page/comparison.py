@@ -117,6 +117,9 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
         yield "agreement, retrained agent", told["retrained"]["agreement"]
     if reward.get("worst_tie_regret_share") is not None:
         yield "lost by the worst tie", percent(max(reward["worst_tie_regret_share"], 0.0))
+    for name, key in compared.DISTANCES.items():
+        if reward.get(key) is not None:
+            yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
     yield "expert optimal under the reward", "yes" if reward["expert_optimal"] else "no"
     if told["retrained"]["score"] is not None:
         steps = run.metrics["training"].get("steps_to_0.99")

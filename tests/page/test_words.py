@@ -7,7 +7,7 @@ import pytest
 from page.made_runs import stepped_run, table_run
 
 from irl_gym.claims import into_new_folder
-from irl_gym.page.compared import policies, values
+from irl_gym.page.compared import policies, rewards, values
 from irl_gym.page.comparison import write_comparison
 from irl_gym.page.episodes import episodes
 from irl_gym.page.proof import certificate, doctor, verdict
@@ -150,3 +150,10 @@ def test_no_agent_is_best_across_environments(lake, tmp_path):
     text = (tmp_path / "mixed.html").read_text()
     assert "best score" not in text and "The environments differ" in text
     assert "<td></td>" not in text and "<td>null</td>" not in text and "<td>not there</td>" in text
+
+
+def test_the_distance_of_the_rewards_is_told_where_it_is_known(lake):
+    told = replace(lake, metrics={**lake.metrics, "reward": {**lake.metrics["reward"], "starc": 0.684, "epic": None}})
+    lead = rewards(told, scene_of(told)).lead
+    assert "Between the two STARC's distance is 0.68, where 0 is a reward that ranks all policies alike" in lead
+    assert "STARC" not in rewards(lake, scene_of(lake)).lead

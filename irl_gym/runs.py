@@ -169,8 +169,8 @@ def not_understood(error: Exception, *paths: str | os.PathLike) -> RunIncomplete
     """The error of folders whose files can be read and say what no run says."""
     told = ", ".join(map(str, paths))
     return RunIncomplete(
-        f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. They were "
-        "changed, or another program wrote them; make the run again."
+        f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. If they "
+        "were changed, or another program wrote them, make the run again; if not, it is a defect of irl_gym: please report it."
     )
 
 

@@ -76,6 +76,14 @@ def test_a_run_killed_in_a_late_stage_continues_with_it(finished, tmp_path, stag
     assert differing(finished, out) == []
 
 
+def test_a_path_with_more_pieces_than_are_kept_is_shown_and_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("irl_gym.final_stages.MOST_PIECES", 3)
+    out = run(tmp_path).out
+    path = read_run(out).lambda_path
+    assert len(path["rewards"]) <= 3 and not path["exact"] and path["gap"] > 0
+    assert "There are more pieces than were worked out: between these the objective can be" in (out / "report.html").read_text()
+
+
 def test_widths_of_steps_are_kept_by_state_and_action(tmp_path):
     out = run(tmp_path, learner=FiniteLP(reward_on="state-action")).out
     widths = read_run(out).widths

@@ -105,9 +105,8 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     }
     thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
     if not path.get("exact", True):
-        thinned += (
-            f" There are more pieces than were worked out: between these the objective can be {number(path['gap'], 2)} larger."
-        )
+        more = number(float(path["gap"]), 2)
+        thinned += f" There are more pieces than were worked out: between these the objective can be {more} larger."
     lead = (
         "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "
         f"lambda_0 = {number(pieces.low[-1])} on it is 0. Move the slider to walk through the pieces.{thinned}"

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from page.made_runs import table_run
@@ -42,6 +44,13 @@ def test_each_position_has_its_words_and_pictures(scene):
     assert data is not None and section.kind == "lambda"
     assert {len(one["values"]) for one in data["figures"].values()} == {len(data["pieces"])} == {7}
     assert all(piece["change"].startswith("At price") for piece in data["pieces"])
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_path_that_is_not_whole_says_how_much_may_be_missing(scene, exact):
+    path = {**scene.run.lambda_path, "exact": np.array(exact), "gap": np.array(0.0125)}
+    lead = lambda_slider(replace(scene, run=replace(scene.run, lambda_path=path)))[0].lead
+    assert ("There are more pieces" in lead and "0.013 larger" in lead) != exact
 
 
 def test_the_slider_starts_at_the_run_s_own_price(tmp_path):

@@ -64,7 +64,7 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
 
 
 def doctor(
-    result: IRLResult | None,
+    result: IRLResult | TabularReward | LinearReward | np.ndarray | None,
     mdp: TabularMDP | None,
     expert: Any,
     *,
@@ -75,7 +75,8 @@ def doctor(
     """Say why a reward came out zero, flat, or useless for retraining.
 
     Args:
-        result: of FiniteLP, FeatureLP or TrajectoryLP; None where the learner raised an error and no reward came out.
+        result: of FiniteLP, FeatureLP or TrajectoryLP; a reward from elsewhere, (S,) paid on arrival or (S, A), of which only
+            the values are known; None where the learner raised an error and no reward came out.
         mdp: the table that the reward is of; None where the environment can only be stepped.
         expert: (S,) actions, (S, A) probabilities, NaN where nothing is known, or (S, A) set; None where it is not known.
         true: (S,) or (S, A) the true reward, where it is known: then it also says what the expert and the worst tie earn.
@@ -84,26 +85,24 @@ def doctor(
 
     Raises:
         InvalidMDP: something else than a table.
-        InvalidParameter: something else than a result, or neither a result nor a table.
+        InvalidParameter: neither a result nor a table, or a reward from elsewhere without a table.
         InvalidReward: a reward of another table.
         InvalidPolicy: an expert of the wrong shape or content.
         InvalidFeatures: features of other observations than the states given.
     """
-    if not isinstance(result, IRLResult | None):
-        raise InvalidParameter(
-            f"result is a {type(result).__name__}: expected an IRLResult, such as `FiniteLP().fit(mdp, expert)`, or None where "
-            "no reward came out."
-        )
     mdp = None if mdp is None else checked_mdp(mdp)
-    if result is None and mdp is None:
-        raise InvalidParameter("result and mdp are None: expected a result, a table, or both.")
+    learned = result if isinstance(result, IRLResult) else None
+    if learned is None and mdp is None:
+        what = "None" if result is None else f"a {type(result).__name__}, a reward without a certificate,"
+        raise InvalidParameter(f"result is {what} and mdp is None: expected a result, a table, or both.")
+    reward = result if learned is None else learned.reward
     case = Case(
         mdp,
         None if mdp is None else expert,
-        None if result is None or mdp is None else _tabular(result.reward, mdp, states),
-        {} if result is None else result.certificate.to_json(),
-        "" if result is None else result.status.value,
-        {} if result is None else result.stats,
+        None if reward is None or mdp is None else _tabular(reward, mdp, states),
+        {} if learned is None else learned.certificate.to_json(),
+        "" if learned is None else learned.status.value,
+        {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
         shaped,
     )
@@ -113,8 +112,9 @@ def doctor(
 def _tabular(reward: Any, mdp: TabularMDP, states: States | None) -> TabularReward:
     if isinstance(reward, LinearReward):
         reward = reward.tabular(mdp.n_states if states is None else states)
-    reward.expected(mdp)  # checks the shape
-    return reward
+    tabular = as_reward(reward)
+    tabular.expected(mdp)  # checks the shape
+    return tabular
 
 
 def diagnose(case: Case) -> Diagnosis:

@@ -14,6 +14,7 @@ from irl_gym.diagnosis import CHECKS, Diagnosis, Finding, doctor
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.rewards import TabularReward
 
 GRID = paper_grid()
 
@@ -49,7 +50,7 @@ def test_the_default_learner_is_healthy_on_random_tables(model):
 def test_a_diagnosis_reads_as_sentences_with_their_mends():
     text = str(doctor(FiniteLP(l1=5.0).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert))
     assert text.startswith("1 finding. Examined: 24 states of 4 actions each, gamma 0.9.\n1. The reward is zero")
-    assert '\n   Mend: l1="auto"' in text
+    assert '\n   Mend: margin_cap="auto" with l1=0.0' in text
 
 
 def test_a_healthy_diagnosis_says_what_was_examined():
@@ -79,10 +80,23 @@ def test_a_finding_of_the_whole_table_names_no_state():
     assert Finding("name", "This.", "That.").states.size == 0 and Diagnosis((), "").healthy
 
 
-@pytest.mark.parametrize("wrong", [1, np.ones(25), "reward"])
-def test_something_else_than_a_result_is_refused(unchecked, wrong):
-    with pytest.raises(InvalidParameter, match="expected an IRLResult"):
+@pytest.mark.parametrize("wrong", [1, np.ones(24), "reward"])
+def test_something_else_than_a_reward_is_refused(unchecked, wrong):
+    with pytest.raises(InvalidReward, match="the reward"):
         doctor(wrong, GRID.mdp, GRID.expert)
+
+
+@pytest.mark.parametrize("kind", [np.asarray, TabularReward])
+def test_a_reward_from_elsewhere_is_judged_by_its_values(kind):
+    learned = FiniteLP().fit(GRID.mdp, GRID.expert).reward.values
+    assert doctor(kind(learned), GRID.mdp, GRID.expert).healthy
+    assert "expert-not-optimal" in doctor(kind(-learned), GRID.mdp, GRID.expert).names
+    assert doctor(kind(np.zeros(25)), GRID.mdp, GRID.expert).names == ("zero-reward",)
+
+
+def test_a_reward_from_elsewhere_needs_a_table():
+    with pytest.raises(InvalidParameter, match="result is a ndarray, a reward without a certificate, and mdp is None"):
+        doctor(np.zeros(25), None, None)
 
 
 def test_something_else_than_a_table_is_refused(unchecked):

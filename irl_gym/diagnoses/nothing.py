@@ -4,8 +4,9 @@ import numpy as np
 
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding, counted, named
-from irl_gym.diagnoses.mends import DEFAULTS, on_steps
+from irl_gym.diagnoses.mends import DEFAULTS, capped, on_steps
 from irl_gym.errors import DegenerateExpert, IrlGymError
+from irl_gym.learners.base import IRLResult
 
 
 def lambda_above_lambda_0(case: Case) -> Finding | None:
@@ -23,12 +24,14 @@ def lambda_above_lambda_0(case: Case) -> Finding | None:
     if lambda_0 is not None and l1 < lambda_0:
         return None
     known = "" if lambda_0 is None else f" lambda_0 is {lambda_0:.6g}."
-    number = "" if lambda_0 is None else f", or a number below {lambda_0:.4g}"
+    number = "" if lambda_0 is None else f" or a number below {lambda_0:.4g}"
+    program, flags = capped(case) or ("l1=0.0", ("--l1 0",))
+    solved = ": solved here, it gives the expert margins" if isinstance(case.best, IRLResult) else ""
     return Finding(
         "lambda-above-lambda-0",
         f"The reward is zero because it is too dear: l1 is {l1:.6g}, and above lambda_0 no reward is worth its price.{known}",
-        f'l1="auto", just below lambda_0{number}; l1=0.0 for the simplest reward with full margins.',
-        flags=("--l1 auto",),
+        f'{program}{solved}. Or l1="auto", just below lambda_0,{number} for simpler rewards, which leave ties.',
+        flags=flags,
     )
 
 

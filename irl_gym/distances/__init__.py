@@ -16,6 +16,7 @@ distance 0 without being the same. What each ignores, when it is computed from a
     potential shaping, 0 at ends     yes    (1)    yes     yes
     S'-redistribution                no     no     yes     no
     a constant, no state terminal    yes    yes    yes     yes
+    a constant, where episodes end   no     yes    no      no
 S'-redistribution moves payments among the successors of (s, a) and keeps their mean. (1): see `canonical.ModelDraws`.
 """
 

@@ -96,7 +96,8 @@ class ModelDraws:
         C(R)(s, a, s') = R(s, a, s') + E[gamma R(s', A, S'') - R(s, A, S') - gamma R(S', A, S'')]
     with A from D_A, S' from P(. | s, A) and S'' from P(. | s', A): only R(S', A, S'') may be an impossible transition.
 
-    Departs: a terminal state is followed by itself, and R is read there as it is given. Shaping leaves C(R) as it is where
+    Departs: a terminal state is followed by itself, and R is read there as it is given. So a constant that is added everywhere
+    is not seen, though where episodes end it changes which policies are best. Shaping leaves C(R) as it is where
     R(s, a, s') + gamma Phi(s') - Phi(s) is added for the triples out of terminal states too.
 
     Raises:

@@ -155,7 +155,8 @@ class STARC(RewardDistance):
     metric: float = 2
     """m is a norm of the difference: 1, 2 or infinity."""
     coverage: np.ndarray | None = None
-    """(S, A) or (S, A, S) distribution; None for uniform over pairs of states that act. The bounds on regret need all pairs."""
+    """(S, A) or (S, A, S) distribution; None for uniform over pairs of states that act. The bounds on regret need all pairs. On
+    few pairs many rewards are alike but for scale: on a single one any two are 0 or 1 apart, or one of them is 0 there."""
 
     def __post_init__(self) -> None:
         _check_canonical(self.canonical)

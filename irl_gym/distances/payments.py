@@ -69,6 +69,8 @@ def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments
         InvalidReward: another shape than the table's, or values that are not finite, or beyond 1e300.
     """
     values = reward.values if isinstance(reward, TabularReward) else reward
+    if hasattr(values, "reward"):
+        raise InvalidReward(f"{name} is an {type(values).__name__}, which holds a reward: pass its `.reward`.")
     if hasattr(values, "tabular"):
         raise InvalidReward(f"{name} is a {type(values).__name__}: expected a table. Pass `reward.tabular(states)`.")
     S, A = checked_mdp(mdp).n_states, mdp.n_actions

@@ -32,6 +32,18 @@ def test_lambda_0_is_computed_where_the_certificate_lacks_it():
     assert "lambda_0 is 1.055" in finding("lambda-above-lambda-0", dear, GRID.mdp, GRID.expert).sentence
 
 
+@pytest.mark.parametrize("margin_cap", ["auto", None])
+def test_the_first_mend_of_a_price_above_lambda_0_is_healthy(margin_cap):
+    found = finding(
+        "lambda-above-lambda-0", FiniteLP(l1=5.0, margin_cap=margin_cap).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert
+    )
+    assert found.mend.startswith('margin_cap="auto" with l1=0.0: solved here') and found.flags == (
+        "--margin-cap auto",
+        "--l1 0",
+    )
+    assert names(FiniteLP(margin_cap="auto", l1=0.0).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert) == ()
+
+
 def test_l1_auto_mends_a_price_above_lambda_0():
     assert "lambda-above-lambda-0" not in names(FiniteLP(l1="auto").fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert)
 

@@ -39,7 +39,7 @@ def test_a_flag_is_one_that_the_loop_takes(flag):
 
 
 def test_the_checks_say_flags():
-    assert {"--l1 auto", "--reward-on state-action", "--episodes", "--slack {10 * slack:g}"} <= set(SAID)
+    assert {"--l1 0", "--reward-on state-action", "--episodes", "--slack {10 * slack:g}"} <= set(SAID)
 
 
 def test_a_run_from_a_dataset_is_told_no_flag_for_other_episodes():

@@ -8,6 +8,7 @@ from irl_gym.distances import EPIC, STARC, MinimalNorm, TableModel, dard, distan
 from irl_gym.distances.bounds import epic_bound
 from irl_gym.distances.random_rewards import shaped
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward, UndefinedDistance
+from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
 
 MODEL = random_model(0, 6, 2, "terminal")  # states 4 and 5 are terminal
@@ -28,6 +29,12 @@ def test_a_reward_that_is_not_finite_is_named(value):
     wrong[3, 1] = value
     with pytest.raises(InvalidReward, match=r"the first reward is (nan|inf) at \[3, 1\]"):
         starc(MDP, wrong, R)
+
+
+def test_a_result_is_told_from_its_reward(unchecked):
+    result = FiniteLP().fit(MDP, MODEL.expert)
+    with pytest.raises(InvalidReward, match="the second reward is an IRLResult, which holds a reward: pass its"):
+        epic(MDP, R, result)
 
 
 def test_text_is_no_reward():

@@ -89,8 +89,12 @@ def write_environment(path: Path, env: gym.Env, env_id: str | None) -> None:
         write_json(path / ENVIRONMENT, told)
 
 
-def into_new_folder(command: Sequence[str]) -> list[str]:
-    """The command with another --out: in the run's own folder everything is there already, and would be kept."""
+def into_folder(command: Sequence[str], folder: str = AGAIN) -> list[str]:
+    """The command with another --out.
+
+    The default makes the run again: in the run's own folder everything is there already, and would be kept. A run that was
+    moved or copied is continued where it is now: the folder that the command names may hold another one.
+    """
     kept: list[str] = []
     skipped = False
     for word in map(str, command):
@@ -98,7 +102,7 @@ def into_new_folder(command: Sequence[str]) -> list[str]:
         if not skipped and flag != "--out":
             kept.append(word)
         skipped = flag == "--out" and "=" not in word
-    return [*kept, "--out", AGAIN]
+    return [*kept, "--out", folder]
 
 
 def flag_of(word: str) -> str:

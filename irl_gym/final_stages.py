@@ -50,8 +50,7 @@ def record(loop: "Loop", folder: Path) -> dict[str, Any]:
     layout = layout_of(loop.env, loop.world) if isinstance(loop.world, TableWorld) else None
     if layout is not None:
         write_json(folder / "grid.json", layout.to_json())
-    asked, kept = loop.experiment, folder / "metrics.csv"
-    write_metrics_csv(loop.folder_metrics, kept, env=loop.env_id, gamma=asked.gamma, seed=asked.seed)
+    write_metrics_csv(loop.folder_metrics, folder / "metrics.csv", env=loop.env_id, config=loop.experiment.to_json())
     return {"without_frames": without}
 
 

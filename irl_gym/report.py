@@ -115,7 +115,7 @@ def _of_training(report: Report) -> str:
     return "\nThe reward is good and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
 
 
-OPTIMAL, OWN = "an optimal action", "one of the expert's actions"
+OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"
 
 
 def _table(table: Mapping[str, Any]) -> str:

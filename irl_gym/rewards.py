@@ -140,22 +140,54 @@ def write_archive(path: str | os.PathLike, header: Mapping[str, Any], arrays: Ma
 def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header and arrays of a file that `write_archive` wrote. Nothing is unpickled.
 
+    Args:
+        path: the file.
+        formats: those that are understood, such as "irl_gym.TabularReward/1".
+
     Raises:
         FileNotFoundError: no such file.
         InvalidReward: another file, or one of another format.
     """
+    kinds = [_kind(one) for one in formats]
+    what = "reward" if all(kind.endswith("Reward") for kind in kinds) else " or ".join(kinds)
+    saved = f"a file that {' or '.join(f'{kind}.save' for kind in kinds)} wrote"
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:  # NumPy would leave a broken zip open
             header = json.loads(str(archive["header"]))
             arrays = {name: archive[name] for name in archive.files if name != "header"}
-    except FileNotFoundError:
-        raise
+    except FileNotFoundError as error:
+        told = f"{path} does not exist: expected {saved}. Save one there, or name another file."
+        raise FileNotFoundError(told) from error
     except UNREADABLE as error:
-        raise InvalidReward(f"{path} holds no reward ({error}): expected a file that a reward's `save` wrote.") from error
+        raise InvalidReward(f"{path} holds no {what} ({_damage(path, error)}): expected {saved}.") from error
     if not isinstance(header, dict) or header.get("format") not in formats:
-        expected = " or ".join(map(repr, formats))
-        raise InvalidReward(f"{path} has format {header!r}: expected {expected}. Was it written by a newer version?")
+        raise _another_format(path, header, formats)
     return header, arrays
+
+
+def _kind(file_format: str) -> str:
+    """The class that a format is of: TabularReward of irl_gym.TabularReward/1."""
+    return file_format.removeprefix("irl_gym.").partition("/")[0]
+
+
+def _damage(path: str | os.PathLike, error: Exception) -> str:
+    """Why an archive cannot be read; NumPy's own words would advise to unpickle what is no archive."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    if not zipfile.is_zipfile(path):
+        return "it is no npz archive"
+    return "it holds pickled objects, which are never read" if "pickle" in str(error) else str(error)
+
+
+def _another_format(path: str | os.PathLike, header: Any, formats: tuple[str, ...]) -> InvalidReward:
+    """The error of an archive that holds another kind of thing, or one of another version."""
+    found = header.get("format") if isinstance(header, dict) else header
+    kind, kinds = _kind(str(found)), [_kind(one) for one in formats]
+    if str(found).startswith("irl_gym.") and kind not in kinds:
+        told = f"{path} holds a {kind}: expected a {' or a '.join(kinds)}. Read it with {kind}.load, or name another file."
+        return InvalidReward(told)
+    expected = " or ".join(map(repr, formats))
+    return InvalidReward(f"{path} has format {found!r}: expected {expected}. Was it written by a newer version?")
 
 
 def as_reward(reward: Any) -> TabularReward:

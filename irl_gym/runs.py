@@ -16,7 +16,7 @@ from gymnasium import spaces
 from minari.serialization import deserialize_space
 
 from irl_gym.choices import environment_of
-from irl_gym.claims import AGAIN, FIRST, STAGES, check_format, into_new_folder, shell_command
+from irl_gym.claims import AGAIN, FIRST, STAGES, check_format, into_folder, shell_command
 from irl_gym.curves import Curve, read_curve
 from irl_gym.discretize import discretize
 from irl_gym.errors import IrlGymError, RunIncomplete
@@ -130,7 +130,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     metrics = reader.read("metrics.json", read_json)
     on_table = metrics.get("table") is not None
     films = path / "films"
-    return Run(
+    run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
         learned=reader.read("reward.npz", load_reward),
@@ -145,6 +145,8 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         widths=_part(reader.maybe("ambiguity.npz", _arrays), "widths"),
         lambda_path=_part(reader.maybe("ambiguity.npz", _arrays), "path"),
     )  # fmt: skip
+    _check_shapes(run, reader)
+    return run
 
 
 @contextlib.contextmanager
@@ -182,14 +184,15 @@ class _Reader:
 
     def incomplete(self, what: str) -> RunIncomplete:
         """The error of a run that has to be continued."""
-        again = shell_command(self.command) or f"recover_and_retrain(experiment, {str(self.path)!r}) with the same experiment"
+        here = None if self.command is None else into_folder(self.command, str(self.path))
+        again = shell_command(here) or f"recover_and_retrain(experiment, {str(self.path)!r}) with the same experiment"
         return RunIncomplete(
             f"{self.path} is incomplete: {what}: expected a finished run. The same command continues it: {again}"
         )
 
     def lost(self, what: str) -> RunIncomplete:
         """The error of a run that cannot be continued, since what says which run it is is gone."""
-        again = shell_command(None if self.command is None else into_new_folder(self.command))
+        again = shell_command(None if self.command is None else into_folder(self.command))
         told = f"with another --out: {again}" if again else f"in a new folder: recover_and_retrain(experiment, {AGAIN!r})"
         return RunIncomplete(
             f"{self.path} is damaged: {what}: expected what the run wrote at its start, which no stage writes again. Make the "
@@ -250,6 +253,24 @@ def _table(reader: _Reader, config: Mapping[str, Any], observations: spaces.Spac
         return reader.read(TABLE, lambda path: load_table(path, observations))
     method: dict[str, Any] = {"successors": "sampled", "samples": config["samples"]} if config["samples"] else {}
     return discretize(_made(config), gamma=config["gamma"], bins=config["bins"], seed=config["seed"], **method)
+
+
+def _check_shapes(run: Run, reader: _Reader) -> None:
+    """Check that rewards and policies are of the run's own table: a file may have been copied from another run.
+
+    Raises:
+        RunIncomplete: one is not, by the name of its file.
+    """
+    if run.table is None:
+        return
+    learned = run.learned.values if isinstance(run.learned, TabularReward) else None  # weights are of features
+    shape = (run.table.mdp.n_states, run.table.mdp.n_actions)
+    for name, found in (("reward.npz", learned), ("expert.npz", run.expert), ("agent_policy.npz", run.agent)):
+        if found is not None and found.shape not in (shape, shape[:1]):
+            raise reader.incomplete(
+                f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; delete it, and its stage is "
+                "run again"
+            )
 
 
 def _actions(path: Path) -> np.ndarray:

@@ -1,11 +1,13 @@
 """Say in sentences what is wrong with the reward of a run, each with a mend.
 
-Exits with 0 where the reward is healthy, 1 where something was found or the run did not finish, 2 where there is no run.
+Exits with 0 where the reward is healthy, 1 where something was found or the run did not finish, be it that its page alone is
+missing, 2 where there is no run.
 
 For example:
     python scripts/doctor.py --run runs/FrozenLake-v1-1a2b3c4d
 """
 
+import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,6 +58,15 @@ def left(path: Path) -> Diagnosis | None:
         return None
 
 
+def without_page(run: Run | None, console: Console) -> bool:
+    """Say that the run stopped before its page, if it did; a version that wrote no run.json wrote no page either."""
+    if run is None or not run.version or (run.path / "report.html").exists():
+        return False
+    again = f"python scripts/report.py --run {shlex.quote(str(run.path))}"
+    console.print(Text(f"\nThe run did not finish: only its page, report.html, is missing. This command writes it: {again}"))
+    return True
+
+
 def main(arguments: Arguments) -> int:
     """Read the run, and say what there is."""
     console, unfinished, run = Console(soft_wrap=True), None, None
@@ -70,7 +81,8 @@ def main(arguments: Arguments) -> int:
     if diagnosis is None:
         return 2
     show(diagnosis, console, run)
-    return 0 if diagnosis.healthy and unfinished is None else 1
+    complete = unfinished is None and not without_page(run, console)
+    return 0 if diagnosis.healthy and complete else 1
 
 
 if __name__ == "__main__":

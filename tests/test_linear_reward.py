@@ -270,16 +270,22 @@ def test_load_unpickles_nothing(tmp_path, name):
         load_reward(tmp_path / "bomb.npz")
 
 
-@pytest.mark.parametrize("load", [LinearReward.load, load_reward])
+@pytest.mark.parametrize("load", [LinearReward.load, load_reward, TabularReward.load])
 def test_load_says_when_there_is_no_file(tmp_path, load):
-    with pytest.raises(FileNotFoundError, match="nowhere"):
+    with pytest.raises(
+        FileNotFoundError, match=r"nowhere\.npz does not exist: expected a file that \w+\.save .*wrote\. Save one"
+    ):
         load(tmp_path / "nowhere.npz")
 
 
 def test_load_of_one_kind_refuses_the_other(tmp_path):
     TabularReward(np.arange(3.0)).save(tmp_path / "table.npz")
     reward_of(OneHot(3)).save(tmp_path / "linear.npz")
-    with pytest.raises(InvalidReward, match=r"has format .*TabularReward"):
+    with pytest.raises(
+        InvalidReward, match=r"holds a TabularReward: expected a LinearReward\. Read it with TabularReward\.load"
+    ):
         LinearReward.load(tmp_path / "table.npz")
-    with pytest.raises(InvalidReward, match=r"has format .*LinearReward"):
+    with pytest.raises(
+        InvalidReward, match=r"holds a LinearReward: expected a TabularReward\. Read it with LinearReward\.load"
+    ):
         TabularReward.load(tmp_path / "linear.npz")

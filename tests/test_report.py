@@ -15,7 +15,7 @@ from irl_gym.report import print_report
 CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
 
 
-def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, **reward):
+def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, demonstrations=None, **reward):
     """What is printed of a run of FiniteLP with these numbers, on one line."""
     row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
     told = {
@@ -29,7 +29,8 @@ def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, 
         "policies": {name: row for name in ("expert", "random", "retrained")}, "score_reason": reason, "reward": told,
         "training": training or {"environment_steps": 4096, "steps_to_0.9": 64, "steps_to_0.99": 2048}, "table": {
             "horizon": None, "error": 0.0, "exact": True, "reachable": 11, "actions": 4, "method": "Published."},
-        "demonstrations": {"given": False, "episodes_only": False, "episodes": 10, "dataset": "lake-v0"},
+        "demonstrations": demonstrations or {
+            "given": False, "episodes_only": False, "episodes": 10, "dataset": "lake-v0"},
     }  # fmt: skip
     asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
     stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
@@ -55,6 +56,15 @@ def test_nothing_is_said_of_scores_when_there_is_none(tmp_path):
 
 def test_a_run_of_an_earlier_version_has_the_reason_of_its_time(tmp_path):
     assert "There is no score: the expert earns no more than random actions." in said(tmp_path, score=None, share=None)
+
+
+@pytest.mark.parametrize(
+    ("only", "told"),
+    [(False, "one of the expert's actions, or an optimal one where it is optimal."), (True, "an optimal action.")],
+)
+def test_agreement_is_told_as_it_is_counted(tmp_path, only, told):
+    demonstrations = {"given": False, "episodes_only": only, "episodes": 10, "dataset": "lake-v0"}
+    assert f"agreement: share of states with {told}" in said(tmp_path, demonstrations=demonstrations)
 
 
 def test_no_advice_on_ties_is_given_when_the_reward_is_zero(tmp_path):

@@ -114,6 +114,21 @@ def test_load_refuses_a_file_that_holds_no_reward(tmp_path, write):
         TabularReward.load(tmp_path / "other.npz")
 
 
+@pytest.mark.parametrize("write", [write_text, write_nothing, write_array, write_pickle])
+def test_load_gives_no_advice_to_unpickle_when_a_file_holds_no_reward(tmp_path, write):
+    write(tmp_path / "other.npz")
+    with pytest.raises(InvalidReward, match=r"it is no npz archive|pickled objects, which are never read") as told:
+        TabularReward.load(tmp_path / "other.npz")
+    assert "unsafely" not in str(told.value) and "allow_pickle" not in str(told.value)
+
+
+def test_load_says_what_the_system_says_when_it_is_given_a_folder(tmp_path):
+    with pytest.raises(
+        InvalidReward, match=r"holds no reward \(Is a directory\): expected a file that TabularReward\.save wrote"
+    ):
+        TabularReward.load(tmp_path)
+
+
 @pytest.mark.parametrize("header", [{"format": "irl_gym.TabularReward/99", "note": {}}, ["a", "list"]])
 def test_load_refuses_another_format(tmp_path, header):
     np.savez(tmp_path / "later.npz", values=np.zeros(3), header=np.array(json.dumps(header)))

@@ -18,6 +18,7 @@ from irl_gym.metrics import policy_value
 from irl_gym.names import action_names, state_name
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
+from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run, understood
 
@@ -98,8 +99,11 @@ def test_the_metrics_csv_is_read_in_one_line(finished, run):
 def test_the_metrics_csv_tells_runs_apart_and_holds_the_rewards_numbers(finished, run):
     with (finished / "metrics.csv").open() as file:
         rows = list(csv.DictReader(file))
+    config = run.config
     told = {(row["env"], float(row["gamma"]), int(row["seed"])) for row in rows}
-    assert told == {(run.env_id, run.config["gamma"], run.config["seed"])}
+    assert told == {(run.env_id, config["gamma"], config["seed"])}
+    for name in ("env_kwargs", "learner", "retrain"):
+        assert {row[name] for row in rows} == {json.dumps(config[name], sort_keys=True)}
     reward = {row["metric"]: row["value"] for row in rows if row["policy"] == "reward"}
     assert float(reward["l1_norm"]) == run.metrics["reward"]["l1_norm"] and reward["expert_optimal"] == "1"
 
@@ -137,7 +141,7 @@ def test_the_command_is_no_part_of_what_identifies_a_run(finished):
 )
 def test_a_run_without_a_file_is_incomplete_by_name(copied, name):
     (copied / name).unlink()
-    with pytest.raises(RunIncomplete, match=rf"{name} is missing.*--out 'a folder'"):
+    with pytest.raises(RunIncomplete, match=rf"{name} is missing.*--out \S+/copy$"):
         read_run(copied)
 
 
@@ -145,6 +149,22 @@ def test_a_run_without_a_file_is_incomplete_by_name(copied, name):
 def test_a_run_with_a_damaged_file_is_incomplete_by_name(copied, name):
     (copied / name).write_bytes(b"[1]")
     with pytest.raises(RunIncomplete, match=f"{name} cannot be read"):
+        read_run(copied)
+
+
+def test_a_copied_run_is_continued_where_it_is_and_not_where_it_came_from(finished, copied):
+    (copied / "reward.npz").unlink()
+    with pytest.raises(RunIncomplete) as told:
+        read_run(copied)
+    assert shlex.split(str(told.value).rpartition(" continues it: ")[2])[-2:] == ["--out", str(copied)]
+    assert "a folder" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["reward.npz", "expert.npz", "agent_policy.npz"])
+def test_a_run_with_a_file_of_another_table_is_incomplete_by_name(copied, name):
+    other = np.zeros(36, dtype=np.int64)
+    TabularReward(other).save(copied / name) if name == "reward.npz" else np.savez(copied / name, actions=other)
+    with pytest.raises(RunIncomplete, match=rf"copy is incomplete: {name} has shape \(36,\).*\(16,\) or \(16, 4\); delete it"):
         read_run(copied)
 
 

@@ -122,7 +122,7 @@ class LambdaPath:
         kind = "all" if self.exact else "some of its"
         return (
             f"lambda path     {kind} {self.n_pieces} pieces from 0 to lambda_0 = {self.lambda_0:.6g}, at most {self.gap:.1e} "
-            f"below f\n||R||_1         {self.l1_norms[0]:.6g} to {self.l1_norms[-1]:.6g}\ntotal margin    "
+            f"below the optimum\n||R||_1         {self.l1_norms[0]:.6g} to {self.l1_norms[-1]:.6g}\ntotal margin    "
             f"{self.total_margins[0]:.6g} to {self.total_margins[-1]:.6g}"
         )
 

@@ -23,7 +23,7 @@ from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.worlds import one_world, run_places, run_title
-from irl_gym.page.written import number, percent, seconds
+from irl_gym.page.written import counted, number, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.runs import SURPRISES, Run, not_understood
 
@@ -160,12 +160,22 @@ def _policies(scenes: Mapping[str, Scene | None]) -> Section | None:
 def _differences(named: Mapping[str, Run]) -> Section:
     """What differs between the configurations."""
     flat = [dict(_leaves(run.config)) for run in named.values()]
-    keys = list(dict.fromkeys(key for one in flat for key in one))
+    keys = _entries(flat)
     rows = [[key, *(_entry(one, key) for one in flat)] for key in keys if not _alike(key, flat)]
     if not rows:
         return Section("differences", "What differs", "The runs have the same configuration.")
-    lead = f"Of the configuration {len(rows)} entries differ; the other {len(keys) - len(rows)} are the same in all runs."
+    told = (
+        f"{counted(len(rows), 'entry differs', 'entries differ')}; the other {len(keys) - len(rows)} are the same in all runs"
+    )
+    lead = f"Of the configuration {told}."
     return _table("differences", "What differs", lead, named, rows)
+
+
+def _entries(flat: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names of all entries; one that is empty in one run and has parts in another is told by its parts."""
+    keys = list(dict.fromkeys(key for one in flat for key in one))
+    empty = {key for one in flat for key, value in one.items() if value in (None, {})}
+    return [key for key in keys if key not in empty or not any(other.startswith(f"{key}.") for other in keys)]
 
 
 def _entry(leaves: Mapping[str, Any], key: str) -> str:

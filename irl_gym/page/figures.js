@@ -81,7 +81,24 @@ function fitLetters(figure, width) {
   const columns = map ? map.z[0].length : figure.data[0].z[0].length;
   const cell = Math.max(width - 90, 120) / Math.max(columns, 1);
   if (letters) letters.textfont.size = Math.round(Math.min(Math.max(0.27 * cell, 7), 11));
-  if (map && map.texttemplate && cell < READABLE) map.texttemplate = "";
+  if (!map || !map.texttemplate) return;
+  if (cell < READABLE) map.texttemplate = "";
+  else if (map.text) fitNumbers(map, cell);
+}
+
+// Plotly's own fit makes all numbers as small as the longest would be in a wider font.
+function fitNumbers(map, cell) {
+  const longest = Math.max(...map.text.flat().map((one) => one.length), 3);
+  map.texttemplate = "%{text}";
+  map.textfont = { size: Math.min(cell / (0.62 * longest), 12) };
+}
+
+// A number in two digits, so that small ones beside large ones do not read 0.00: 0.13, 0.0015, 7e-4.
+function short(value) {
+  if (value === null) return "";
+  const size = Math.abs(value);
+  if (size >= 10 || value === 0) return String(Math.round(value));
+  return size < 0.001 ? value.toExponential(0) : String(Number(value.toPrecision(2)));
 }
 
 // What a cell of a map is called where its place and number do not say it: the action, and of a field of a cell the cell.
@@ -103,6 +120,7 @@ function drawFigure(name) {
   }
   const map = figure.data.find((one) => one.name === "values" && one.z);
   if (map) map.customdata = calledCells(spec, map.z);
+  if (map && spec.short) map.text = map.z.map((row) => row.map(short));
   const width = box.clientWidth;
   fitLetters(figure, width);
   if (width < NARROW) {

@@ -109,7 +109,7 @@ def bars(
     labels = _different([named(one) for one in names])
     colours = ["var(--learned)" if value >= 0 else "var(--bad)" for value in values]
     figure = blank(
-        xaxis=axis(title={"text": unit}, zeroline=True, **({} if alike is None else {"range": _span(alike)})),
+        xaxis=axis(title={"text": unit}, zeroline=True, **({} if alike is None else {"range": span(alike)})),
         yaxis=bar_axis(), bargap=0.25,
     )  # fmt: skip
     figure.add_bar(
@@ -120,7 +120,7 @@ def bars(
     return Panel(name, title, caption, figure, height=70 + (ROW + 11 * lines) * max(len(labels), 3))
 
 
-def _span(values: np.ndarray) -> list[float]:
+def span(values: np.ndarray) -> list[float]:
     """The ends of a scale for bars, which begin at 0."""
     finite = values[np.isfinite(values)]
     low, high = float(finite.min(initial=0.0)), float(finite.max(initial=0.0))

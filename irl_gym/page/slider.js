@@ -13,9 +13,15 @@
     const value = changing.values[i];
     if (changing.kind === "z") spec.data[changing.trace].z = value;
     if (changing.kind === "x") spec.data[changing.trace].x = value;
+    if (changing.ends) scale(spec, changing, changing.ends[i]);
     if (changing.kind === "arrows") spec.arrows.sets = value;
     if (changing.kind === "cursor") Object.assign(spec.layout.shapes[0], { x0: value, x1: value });
     spec.layout.datarevision = i;
+  }
+
+  function scale(spec, changing, [low, high]) {
+    if (changing.kind === "z") Object.assign(spec.data[changing.trace], { zmin: low, zmax: high });
+    else spec.layout.xaxis.range = [low, high];
   }
 
   function tell(i) {

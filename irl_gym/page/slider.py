@@ -6,14 +6,15 @@ Axes: S states, A actions, k pieces.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym._typing import ActionSets
+from irl_gym._typing import ActionSets, StateMask
 from irl_gym.dynamic_programming import Discounted, backup, tied
 from irl_gym.metrics import optimal_actions, tie_tolerance
 from irl_gym.page import maps, panels
@@ -25,6 +26,10 @@ from irl_gym.rewards import TabularReward
 
 MOST_PIECES = 240
 """Positions of the slider."""
+FAINT = 0.1
+"""Share of the path's largest reward below which colours suit the piece."""
+NOTHING = 1e-9
+"""Share of a piece's largest reward up to which a reward or a margin is 0."""
 MOST_CELLS = 90_000
 """Pieces times cells of a map that the page holds."""
 BARS = 24
@@ -53,6 +58,20 @@ class Pieces:
     of: int
     """Pieces of the whole path."""
 
+    @cached_property
+    def largest(self) -> np.ndarray:
+        """(k,) the largest |R| of each piece."""
+        return np.nan_to_num(np.abs(self.rewards)).reshape(len(self.rewards), -1).max(axis=1)
+
+    @cached_property
+    def faint(self) -> StateMask:
+        """(k,) is a piece so small beside the largest that one scale for all would leave it without colours?"""
+        return (self.largest > 0) & (self.largest < FAINT * self.largest.max())
+
+    def rounded(self, values: np.ndarray) -> np.ndarray:
+        """Rewards or margins (k, S), with 0 for what is nothing in its piece."""
+        return np.where(np.abs(values) <= NOTHING * self.largest[:, None], 0.0, values)
+
     @classmethod
     def of_path(cls, path: Mapping[str, Any], most: int) -> "Pieces":
         """At most `most` pieces of a path, evenly, with the first and the last."""
@@ -79,7 +98,8 @@ def _named(sentence: str, scene: Scene) -> str:
     """A sentence with its states called as the figures call them."""
 
     def called(found: re.Match[str]) -> str:
-        return " and ".join(f"({scene.name(int(row))})" for row in found[1].split(", "))
+        *others, last = (f"({scene.name(int(row))})" for row in found[1].split(", "))
+        return f"{', '.join(others)} and {last}" if others else last
 
     if not set(map(int, re.findall(r"\d+", " ".join(STATES.findall(sentence))))) <= set(range(scene.mdp.n_states)):
         return sentence
@@ -141,16 +161,17 @@ def _told(pieces: Pieces, i: int) -> dict[str, str]:
     """The words at a position."""
     high = pieces.high[i]
     span = f"{number(pieces.low[i])} to {number(high)}" if np.isfinite(high) else f"above {number(pieces.low[i])}"
-    largest = float(np.nanmax(np.abs(pieces.rewards[i])))
-    with_margin = int((pieces.margins[i] > 1e-9 * max(largest, 1e-300)).sum()) if largest else 0
+    least = NOTHING * max(float(pieces.largest[i]), 1e-300)
+    with_margin = int((pieces.margins[i] > least).sum())
     judged = int(np.isfinite(pieces.margins[i]).sum())
-    paid = int((np.abs(pieces.rewards[i]) > 1e-9 * max(largest, 1e-300)).sum()) if largest else 0
+    paid = int((np.abs(pieces.rewards[i]) > least).sum())
     return {
         "span": span,
         "number": f"{i + 1} of {len(pieces.low)}",
         "norm": number(pieces.l1_norms[i]),
         "margins": f"{with_margin:,} of {judged:,}",
         "paid": f"{paid:,}",
+        "colours": "this piece" if pieces.faint[i] else "all pieces",
         "change": pieces.changes[i],
     }
 
@@ -163,38 +184,55 @@ def _shown_rewards(pieces: Pieces) -> np.ndarray:
 def _rewards(scene: Scene, pieces: Pieces) -> tuple[Panel, dict[str, Any]]:
     over = "" if pieces.rewards.ndim == 2 else ", the largest over actions"
     return _changing(
-        scene, "path-reward", "Reward", _shown_rewards(pieces), panels.REWARDS, True, f"Reward at this lambda{over}.", "reward"
+        scene,
+        pieces,
+        "path-reward",
+        "Reward",
+        _shown_rewards(pieces),
+        panels.REWARDS,
+        True,
+        f"Reward at this lambda{over}.",
+        "reward",
     )
 
 
 def _margins(scene: Scene, pieces: Pieces) -> tuple[Panel, dict[str, Any]]:
     caption = "How much better the expert's action is than the next best, at this lambda."
-    return _changing(scene, "path-margin", "Margins", pieces.margins, panels.WIDTHS, False, caption, "margin")
+    return _changing(scene, pieces, "path-margin", "Margins", pieces.margins, panels.WIDTHS, False, caption, "margin")
 
 
 def _changing(
-    scene: Scene, name: str, title: str, values: np.ndarray, scale: str, centred: bool, caption: str, unit: str
+    scene: Scene, pieces: Pieces, name: str, title: str, values: np.ndarray, scale: str, centred: bool, caption: str, unit: str
 ) -> tuple[Panel, dict[str, Any]]:
-    """A figure of values (k, S), one row a position, with one scale for all of them."""
+    """A figure of values (k, S), one row a position, with one scale for all of them but the faint, which have their own."""
     place, shown = scene.place, scene.mdp.reachable if centred else scene.acting
+    values = pieces.rounded(values)
     if place is not None:
         suited = values[:, shown]
         panel = maps.heat(
             name, title, place, values[0], scale=scale, centred=centred, caption=caption, shown=shown, alike=suited
         )
+        panel = replace(panel, extra={**panel.extra, "short": True})
         every = place.stride
         hidden = place.layout.blocked | ~place.cells(shown)
         pictures = [listed(np.where(hidden, np.nan, place.cells(one))[::every, ::every], 4) for one in values]
-        return panel, {"kind": "z", "trace": 1, "values": pictures}
+        ends = _scales(pieces, values[:, shown], lambda one: maps.ends(one, centred=centred))
+        return panel, {"kind": "z", "trace": 1, "values": pictures, "ends": ends}
     rows = np.flatnonzero(shown & np.isfinite(values).all(axis=0))
     rows = rows[np.argsort(-np.ptp(values[:, rows], axis=0), kind="stable")][:BARS]
     rows = rows[telling(values[0][rows])]
     caption += f" Drawn are the {rows.size} states in which it changes most."
     panel = panels.bars(name, title, values[0][rows], scene.names(rows), what=unit, caption=caption, unit=unit)
     panel.figure.data[0].marker = {"color": "var(--learned)"}
-    low, high = float(min(values[:, rows].min(initial=0), 0)), float(max(values[:, rows].max(initial=0), 0))
-    panel.figure.layout.xaxis.range = [1.05 * low, 1.05 * high or 1.0]
-    return panel, {"kind": "x", "trace": 0, "values": [listed(one[rows], 4) for one in values]}
+    ends = _scales(pieces, values[:, rows], panels.span)
+    panel.figure.layout.xaxis.range = ends[0]
+    return panel, {"kind": "x", "trace": 0, "values": [listed(one[rows], 4) for one in values], "ends": ends}
+
+
+def _scales(pieces: Pieces, values: np.ndarray, ends: Callable[[np.ndarray], Sequence[float]]) -> list[list[float]]:
+    """The ends of the scale at each position, of values (k, n)."""
+    usual = [*ends(values)]
+    return [[*ends(one)] if faint else usual for one, faint in zip(values, pieces.faint, strict=True)]
 
 
 def _policy(scene: Scene, sets: list[ActionSets]) -> tuple[Panel, dict[str, Any]]:

@@ -26,12 +26,17 @@ document.getElementById("theme").addEventListener("click", () => {
 system.addEventListener("change", setTheme);
 nameTheme();
 
-// A box that scrolls is a stop for the keyboard; one that does not is none.
+// A box that scrolls is a stop for the keyboard; one that does not is none. For the last few rows nobody has to scroll.
+const FEW_MORE = 120; // pixels
+
 function stops() {
   document.querySelectorAll(".scroll").forEach((box) => {
-    box.classList.remove("more");
-    const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
+    box.classList.remove("more", "wide", "whole");
+    if (box.scrollHeight <= box.clientHeight + FEW_MORE) box.classList.add("whole");
+    const wide = box.scrollWidth > box.clientWidth + 1;
+    const scrolls = wide || box.scrollHeight > box.clientHeight + 1;
     box.classList.toggle("more", scrolls);
+    box.classList.toggle("wide", wide);
     if (scrolls) box.setAttribute("tabindex", "0");
     else box.removeAttribute("tabindex");
   });

@@ -15,8 +15,27 @@ from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.runs import Run
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
-COLOURS = ("learned", "bad", "expert", "warn", "action4", "action6")
-"""Of the lines of one figure, in turn."""
+COLOURS = tuple(f"run{i}" for i in range(6))
+"""Of the lines of one figure, in turn: far apart in hue and lightness, for the colour-blind too; levels have others."""
+DASHES = ("solid", "9px,3px", "9px,3px,2px,3px", "4px,2px", "9px,3px,2px,3px,2px,3px")
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross")
+"""Of lines, and of the points on them, once all colours were used: these go on to the next when the colours begin again."""
+
+
+class Stroke(NamedTuple):
+    """How one of several lines is drawn."""
+
+    colour: str
+    dash: str
+    marker: Mapping[str, Any]
+    """Small points where the colour says enough; else few, and large enough for their shape to be seen."""
+
+
+def stroke(i: int) -> Stroke:
+    """How line i of a figure is drawn; up to 30 lines are all drawn differently."""
+    turn = i // len(COLOURS) % len(SYMBOLS)
+    shape = {"size": 4} if turn == 0 else {"size": 9, "maxdisplayed": 12}
+    return Stroke(COLOURS[i % len(COLOURS)], DASHES[turn], {"symbol": SYMBOLS[turn], **shape})
 
 
 class Level(NamedTuple):
@@ -29,11 +48,13 @@ class Level(NamedTuple):
     dash: str
     listed: bool = True
     """Is it in the legend?"""
+    marker: Mapping[str, Any] | None = None
+    """At its ends, where the line is that of a curve whose colour another curve has too."""
 
 
 def usual_levels(expert: float | None, random: float | None) -> tuple[Level, Level]:
-    """The expert, dashed, and random actions, dotted, where there is one of each."""
-    return Level("expert", expert, "expert", "dash"), Level("random", random, "muted", "dot")
+    """The expert, dashed, and random actions, dotted, where there is one of each; in colours that no curve has."""
+    return Level("expert", expert, "ink", "dash"), Level("random", random, "muted", "dot")
 
 
 def learning(run: Run) -> Section:
@@ -94,7 +115,7 @@ def curves(
     )  # fmt: skip
     last = max(float(steps[-1]) for steps, *_ in series.values())
     for i, (name, (steps, values, band)) in enumerate(series.items()):
-        colour = COLOURS[i % len(COLOURS)]
+        colour, dash, marker = stroke(i)
         if band is not None:
             x, y = np.concatenate([steps, steps[::-1]]), np.concatenate([band[1], band[0][::-1]])
             figure.add_scatter(
@@ -103,14 +124,13 @@ def curves(
             )  # fmt: skip
         figure.add_scatter(
             x=listed(steps, 9), y=listed(values), mode="lines+markers", name=plotted(name),
-            line={"color": f"var(--{colour})", "width": 2}, marker={"size": 4},
-            hovertemplate="%{x:,} steps: %{y}",
+            line={"color": f"var(--{colour})", "width": 2, "dash": dash}, marker=marker, hovertemplate="%{x:,} steps: %{y}",
         )  # fmt: skip
     for level in levels:
         if level.value is not None:
             figure.add_scatter(
-                x=[0, last], y=[level.value] * 2, mode="lines", name=f"{plotted(level.name)} {number(level.value)}",
-                hoverinfo="skip", showlegend=level.listed,
+                x=[0, last], y=[level.value] * 2, mode="lines+markers" if level.marker else "lines", marker=level.marker,
+                name=f"{plotted(level.name)} {number(level.value)}", hoverinfo="skip", showlegend=level.listed,
                 line={"color": f"var(--{level.colour})", "dash": level.dash, "width": 2},
             )  # fmt: skip
     return figure

@@ -12,7 +12,7 @@ import numpy as np
 from irl_gym.intervals import interquartile_mean
 from irl_gym.page.asked import written
 from irl_gym.page.report import page_title
-from irl_gym.page.training import COLOURS, Level, usual_levels
+from irl_gym.page.training import COLOURS, Level, stroke, usual_levels
 from irl_gym.pooling import without_seeds
 from irl_gym.runs import Run
 
@@ -107,8 +107,9 @@ def levels_of(drawn: Mapping[str, Mapping[str, Run]]) -> list[Level]:
         for i, (name, runs) in enumerate(drawn.items()):
             known = [one for one in worth(runs, usual.name).values() if one is not None]
             level = interquartile_mean(np.array(known)) if known else None
-            colour = COLOURS[i % len(COLOURS)]
-            made.append(Level(f"{usual.name} of {name}", level, colour, usual.dash, listed=False))
+            colour, _, marker = stroke(i)
+            shape = marker if i >= len(COLOURS) else None
+            made.append(Level(f"{usual.name} of {name}", level, colour, usual.dash, listed=False, marker=shape))
     return made
 
 

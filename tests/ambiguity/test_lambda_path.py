@@ -245,10 +245,21 @@ def test_saved_path_is_read_back(grid, tmp_path):
     assert LambdaPath.load(tmp_path / "path.npz").to_json() == grid.to_json()
 
 
-def test_load_refuses_another_file(grid, tmp_path):
+def test_load_names_both_kinds_when_the_file_holds_a_reward(grid, tmp_path):
     grid.at(0).save(tmp_path / "reward.npz")
-    with pytest.raises(InvalidReward, match="LambdaPath"):
+    with pytest.raises(InvalidReward, match=r"holds a TabularReward: expected a LambdaPath\. Read it with TabularReward\.load"):
         LambdaPath.load(tmp_path / "reward.npz")
+
+
+def test_load_asks_for_a_path_when_the_file_is_text(tmp_path):
+    (tmp_path / "README.md").write_text("a letter")
+    with pytest.raises(InvalidReward, match=r"holds no LambdaPath \(it is no npz archive\).*LambdaPath\.save wrote"):
+        LambdaPath.load(tmp_path / "README.md")
+
+
+def test_load_says_when_there_is_no_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nope\.npz does not exist: expected a file that LambdaPath\.save wrote"):
+        LambdaPath.load(tmp_path / "nope.npz")
 
 
 def test_json_holds_no_nan(grid):
@@ -258,4 +269,4 @@ def test_json_holds_no_nan(grid):
 
 def test_path_is_told_in_three_lines(grid):
     assert str(grid).splitlines()[0].startswith("lambda path     all 28 pieces from 0 to lambda_0 = 1.05505")
-    assert len(str(grid).splitlines()) == 3
+    assert len(str(grid).splitlines()) == 3 and str(grid).splitlines()[0].endswith(" below the optimum")

@@ -59,6 +59,13 @@ def test_only_what_differs_of_the_configurations_is_listed(pages, look):
     assert look(pages["two"]).locator("#differences tbody th").all_inner_texts() == ["learner.l1", "seed"]
 
 
+def test_arguments_of_one_run_alone_are_one_row(runs, tmp_path):
+    lake = runs["lake"]
+    write_comparison([lake, replace(lake, config={**lake.config, "env_kwargs": {"desc": ["SG"]}})], tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text()
+    assert "Of the configuration 1 entry differs;" in text and '<th scope="row">env_kwargs.desc</th><td>not there</td>' in text
+
+
 def test_the_name_of_a_folder_is_never_markup(pages, look):
     assert "<i>cart" in look(pages["three"]).locator("header").inner_text()
 

@@ -53,6 +53,35 @@ def test_a_path_that_is_not_whole_says_how_much_may_be_missing(scene, exact):
     assert ("There are more pieces" in lead and "0.013 larger" in lead) != exact
 
 
+def with_path(scene, **changes):
+    return replace(scene, run=replace(scene.run, lambda_path={**scene.run.lambda_path, **changes}))
+
+
+def test_a_faint_piece_has_colours_of_its_own_and_says_so(scene):
+    rewards = scene.run.lambda_path["rewards"].copy()
+    rewards[-1] = 0.0
+    rewards[-1, 14] = 0.01 * np.abs(rewards).max()
+    _, data = lambda_slider(with_path(scene, rewards=rewards))
+    *others, faint, none = data["figures"]["path-reward"]["ends"]
+    assert faint == pytest.approx([-rewards[-1, 14], rewards[-1, 14]]) and all(one == none for one in others)
+    assert [piece["colours"] for piece in data["pieces"]] == ["all pieces"] * 5 + ["this piece", "all pieces"]
+
+
+def test_what_is_counted_as_no_reward_is_drawn_as_0(scene):
+    rewards = scene.run.lambda_path["rewards"].copy()
+    rewards[0, 1] = 1e-12 * np.abs(rewards[0]).max()
+    _, data = lambda_slider(with_path(scene, rewards=rewards))
+    drawn = [one for row in data["figures"]["path-reward"]["values"][0] for one in row if one]
+    assert f"{len(drawn)}" == data["pieces"][0]["paid"] and len(drawn) == (np.abs(rewards[0]) > 1e-6).sum()
+
+
+def test_several_states_are_told_with_commas_and_one_and(scene):
+    changes = [{"sentence": "At price 1 the reward of states 1, 2, 3 becomes 0; that of state 4 falls."}] * 7
+    _, data = lambda_slider(with_path(scene, changes=changes))
+    told = "(row 0, column 1), (row 0, column 2) and (row 0, column 3) becomes 0; that of state (row 1, column 0) falls."
+    assert data["pieces"][0]["change"].endswith(told.replace("state (", "("))
+
+
 def test_the_slider_starts_at_the_run_s_own_price(tmp_path):
     found = Scene.of(table_run(tmp_path, l1=0.5, films=False))
     assert found is not None

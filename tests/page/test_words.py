@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from page.made_runs import stepped_run, table_run
 
-from irl_gym.claims import into_new_folder
+from irl_gym.claims import into_folder
 from irl_gym.page.compared import policies, rewards, values
 from irl_gym.page.comparison import write_comparison
 from irl_gym.page.episodes import episodes
@@ -107,7 +107,7 @@ def test_why_there_are_no_pictures_is_a_sentence(lake):
 @pytest.mark.parametrize("out", [["--out", "runs/a"], ["--out=runs/a"], []])
 def test_the_command_makes_the_run_in_a_new_folder(out):
     command = ["python", "x.py", *out, "--seed", "1"]
-    assert into_new_folder(command) == ["python", "x.py", "--seed", "1", "--out", "runs/again"]
+    assert into_folder(command) == ["python", "x.py", "--seed", "1", "--out", "runs/again"]
 
 
 @pytest.mark.parametrize(

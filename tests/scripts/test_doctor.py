@@ -16,6 +16,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
+from irl_gym.rewards import TabularReward
 from irl_gym.runs import read_run
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "doctor.py"
@@ -61,6 +62,29 @@ def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(runs, tmp_path)
     (tmp_path / "killed" / ".stages" / "reward.json").unlink()
     done = doctor(tmp_path / "killed")
     assert done.returncode == 1 and "'reward' was not finished" in done.stderr and "no-reward" in done.stdout
+
+
+def test_a_run_without_its_page_is_told_apart_and_how_to_write_it(runs, tmp_path):
+    out = shutil.copytree(runs / "healthy", tmp_path / "no page")
+    for name in ("report.html", ".stages/report.json"):
+        (out / name).unlink()
+    done = doctor(out)
+    assert done.returncode == 1 and done.stdout.startswith("Healthy.") and done.stderr == ""
+    told = "The run did not finish: only its page, report.html, is missing. This command writes it: "
+    assert f"{told}python scripts/report.py --run '{out}'" in done.stdout
+
+
+def test_a_run_of_an_earlier_version_without_a_page_did_finish(runs, tmp_path):
+    out = shutil.copytree(runs / "healthy", tmp_path / "older")
+    for name in ("run.json", "report.html", ".stages/report.json"):
+        (out / name).unlink()
+    assert doctor(out).returncode == 0
+
+
+def test_a_reward_of_another_table_is_named_with_its_run(runs, tmp_path):
+    out = shutil.copytree(runs / "healthy", tmp_path / "mixed")
+    TabularReward(np.zeros(36)).save(out / "reward.npz")
+    assert f"{out} is incomplete: reward.npz has shape (36,)" in doctor(out).stderr
 
 
 def test_a_folder_without_a_run_exits_with_2(tmp_path):

@@ -7,7 +7,7 @@ import reference
 from hypothesis import given
 
 from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration
-from irl_gym.errors import InvalidMDP, InvalidParameter
+from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import (
     agreement,
@@ -255,46 +255,6 @@ def test_occupancy_distance_bounds_the_difference_of_values(model):
 def test_occupancy_distance_refuses_to_compare_something_else():
     with pytest.raises(InvalidParameter, match="on is 'action': expected 'state'"):
         occupancy_distance(two_ways(), np.zeros(3, dtype=int), np.zeros(3, dtype=int), on="action")
-
-
-@pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("call", [
-    lambda mdp: policy_value(mdp, FLAT, ZEROS),
-    lambda mdp: policy_value(mdp, FLAT, ZEROS, horizon=3),
-    lambda mdp: random_value(mdp, FLAT),
-    lambda mdp: regret(mdp, FLAT, ZEROS),
-    lambda mdp: expected_value_difference(mdp, FLAT, FLAT),
-    lambda mdp: expected_value_difference(mdp, FLAT, FLAT, ZEROS),
-    lambda mdp: worst_tie(mdp, FLAT, FLAT),
-    lambda mdp: best_tie(mdp, FLAT, FLAT),
-    lambda mdp: agreement(mdp, ZEROS, np.ones((3, 2), bool)),
-    lambda mdp: tie_aware_agreement(mdp, FLAT, ZEROS),
-    lambda mdp: occupancy_distance(mdp, ZEROS, ZEROS),
-])  # fmt: skip
-def test_metrics_refuse_an_environment_where_a_table_is_expected(call):
-    with pytest.raises(InvalidMDP, match="mdp is a str: expected a TabularMDP, such as `tabulate"):
-        call("FrozenLake-v1")
-
-
-@pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("tolerance", [-1e-6, np.nan, None])
-def test_a_tolerance_of_ties_is_a_share(tolerance):
-    with pytest.raises(InvalidParameter, match=r"tolerance is .*: expected a share"):
-        tie_aware_agreement(two_ways(), FLAT, ZEROS, tolerance=tolerance)
-
-
-@pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("horizon", [-1, 2.5, "all"])
-def test_a_horizon_is_a_number_of_steps(horizon):
-    with pytest.raises(InvalidParameter, match=r"horizon is .*: expected a whole number of steps"):
-        policy_value(two_ways(), FLAT, ZEROS, horizon)
-
-
-@pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("good", [np.ones((2, 2), bool), np.ones((3, 2)), ZEROS])
-def test_agreement_refuses_something_else_than_a_set_of_actions(good):
-    with pytest.raises(InvalidParameter, match=r"good has shape .*: expected \(3, 2\) booleans, such as `optimal_actions"):
-        agreement(two_ways(), ZEROS, good)
 
 
 def test_agreement_is_nan_where_every_episode_starts_at_its_end():

@@ -181,7 +181,10 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
         yield "worst-tie regret", _worst_tie(reward)
     known = [f"{name} {reward[key]:.2f}" for name, key in (("STARC", "starc"), ("EPIC", "epic")) if reward.get(key) is not None]
     if known:
-        yield "distance from the true one", f"{', '.join(known)} (0: ranks policies alike, 0.71: unrelated)"
+        yield (
+            "distance from the true one",
+            f"{', '.join(known)}; 0 ranks all policies alike, 0.71 is unrelated; the best can agree in spite of it",
+        )
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )

@@ -1,7 +1,7 @@
 """Say in sentences what is wrong with the reward of a run, each with a mend.
 
 Exits with 0 where the reward is healthy, 1 where something was found or the run did not finish, be it that its page alone is
-missing, 2 where there is no run.
+missing, 2 where there is no run, or its files cannot be examined.
 
 For example:
     python scripts/doctor.py --run runs/FrozenLake-v1-1a2b3c4d

@@ -116,8 +116,8 @@ def test_a_curve_that_ends_below_has_not_settled():
 
 
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(tmp_path):
-    assert "distance from the true one │ STARC 0.68, EPIC 0.71 (0: ranks policies alike" in said(
+    assert "distance from the true one │ STARC 0.68, EPIC 0.71; 0 ranks all policies alike" in said(
         tmp_path, starc=0.684, epic=0.706
     )
-    assert "distance from the true one │ STARC 0.50 (0:" in said(tmp_path, starc=0.5, epic=None)
+    assert "distance from the true one │ STARC 0.50; 0" in said(tmp_path, starc=0.5, epic=None)
     assert "distance from" not in said(tmp_path)

@@ -7,6 +7,9 @@ import numpy as np
 
 from irl_gym.errors import InvalidInput, InvalidParameter
 
+LARGEST = 1e300
+"""Sums of larger numbers overflow."""
+
 
 def checked_number(
     name: str,

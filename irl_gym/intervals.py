@@ -15,14 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import trim_mean
 
-from irl_gym.checks import checked_number, checked_rng, float_array
+from irl_gym.checks import LARGEST, checked_number, checked_rng, float_array
 from irl_gym.errors import InvalidParameter
 
 LEVEL = 0.95
 """Confidence of an interval."""
 RESAMPLES = 2_000
-LARGEST = 1e300
-"""Sums of larger values overflow."""
 
 
 class Interval(NamedTuple):

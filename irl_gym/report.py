@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
+from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
 
@@ -179,7 +180,7 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
         yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
     if "worst_tie_regret" in reward:
         yield "worst-tie regret", _worst_tie(reward)
-    known = [f"{name} {reward[key]:.2f}" for name, key in (("STARC", "starc"), ("EPIC", "epic")) if reward.get(key) is not None]
+    known = [f"{name} {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]
     if known:
         yield (
             "distance from the true one",

@@ -7,15 +7,13 @@ Pearson's distance sqrt((1 - rho) / 2) is half the norm of the difference of the
 import numpy as np
 
 from irl_gym._typing import Numbers
-from irl_gym.checks import float_array
+from irl_gym.checks import LARGEST, float_array
 from irl_gym.errors import InvalidReward, UndefinedDistance
 
 ROUNDING = 1e-12
 """Values of which the canonical form is this share of the reward, or less, are rounding: the canonical form is 0."""
 DIGITS = 10
 """The same for numbers of low precision: this times the step from 1 to the next number, 1.2e-6 for float32."""
-LARGEST = 1e300
-"""Sums of larger rewards overflow."""
 
 
 def numbers(name: str, values: object, expected: str) -> tuple[np.ndarray, float]:

@@ -15,6 +15,9 @@ import numpy as np
 from irl_gym.distances.comparing import ROUNDING, half_difference, ranks, standardised
 from irl_gym.errors import UndefinedDistance
 
+Roundings = tuple[float, float]
+"""How far rounding puts values of the first and of the second reward off."""
+
 
 @dataclass(frozen=True)
 class Distance:
@@ -40,28 +43,28 @@ def jackknife(without: Callable[[int], float], blocks: int) -> float:
     return float((blocks - 1) * values.var())
 
 
-def correlation_distance(first: np.ndarray, second: np.ndarray, rounding: float, *, ranked: bool) -> float:
+def correlation_distance(first: np.ndarray, second: np.ndarray, rounding: Roundings, *, ranked: bool) -> float:
     """sqrt((1 - rho) / 2) of two samples (N,).
 
     Args:
         first: canonical values of one reward.
         second: of the other.
-        rounding: values within it are equal.
+        rounding: values of each within its own are equal: one reward may be far larger than the other.
         ranked: use the correlation of ranks.
 
     Raises:
         UndefinedDistance: a sample without variance.
     """
     weights = np.full(first.size, 1 / first.size)
-    named = (("the first reward", first), ("the second reward", second))
+    named = zip(("the first reward", "the second reward"), (first, second), rounding, strict=True)
     if ranked:
-        one, other = (standardised(ranks(x, weights, rounding), weights, ROUNDING, name) for name, x in named)
+        one, other = (standardised(ranks(x, weights, off), weights, ROUNDING, name) for name, x, off in named)
     else:
-        one, other = (standardised(x, weights, rounding, name) for name, x in named)
+        one, other = (standardised(x, weights, off, name) for name, x, off in named)
     return half_difference(one, other, weights)
 
 
-def replicated_distance(first: np.ndarray, second: np.ndarray, rounding: float, *, centred: bool) -> float:
+def replicated_distance(first: np.ndarray, second: np.ndarray, rounding: Roundings, *, centred: bool) -> float:
     """sqrt((1 - rho) / 2) of the means of replicates (N, K), without the noise of these means.
 
     A product of two different replicates has no noise in its mean, where the square of a noisy mean has; so
@@ -70,7 +73,7 @@ def replicated_distance(first: np.ndarray, second: np.ndarray, rounding: float, 
     Args:
         first: replicates of the canonical values of one reward.
         second: of the other, from the same draws.
-        rounding: a mean square of at most its square is 0.
+        rounding: a mean square of each of at most the square of its own is 0.
         centred: take the mean over N off, as a correlation does; STARC does not.
 
     Raises:
@@ -79,8 +82,8 @@ def replicated_distance(first: np.ndarray, second: np.ndarray, rounding: float, 
     if centred:
         first, second = first - first.mean(), second - second.mean()
     xx, yy, xy = _product(first, first), _product(second, second), _product(first, second)
-    for name, square in (("first", xx), ("second", yy)):
-        if not square > rounding**2:
+    for name, square, off in zip(("first", "second"), (xx, yy), rounding, strict=True):
+        if not square > off**2:
             raise UndefinedDistance(
                 f"the canonical form of the {name} reward has a mean square of {square:.1e} on these transitions: expected "
                 "more than 0, or its distance is not defined. The reward is constant or only a potential, or drowned in the "

@@ -129,7 +129,7 @@ def _correlated(
     fresh = None if fresh is None else checked_sample(fresh, FreshSample)
     forms = [_Canonical(reward, transitions, fresh) for reward in (first, second)]
     x, y = (form.values(None) for form in forms)
-    rounding = max(form.rounding for form in forms)
+    rounding = (forms[0].rounding, forms[1].rounding)
     value = correlation_distance(x, y, rounding, ranked=ranked)
     block = transitions.blocks(BLOCKS)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.distances.jackknife import Distance, jackknife, replicated_distance
+from irl_gym.distances.jackknife import Distance, Roundings, jackknife, replicated_distance
 from irl_gym.distances.models import Model, stepped
 from irl_gym.distances.sampled import BLOCKS, ROWS, Payer, RewardCall, checked_sample
 from irl_gym.distances.transitions import Transitions
@@ -67,7 +67,7 @@ def sampled_dard(
         for r, pays in enumerate(rewards):
             more = pays(following, drawn, after_next) - pays(after_here, drawn, after_next)
             values[r, :, k] = given[r] + gamma * more - pays(here, drawn, after_here)
-    return _estimated(values, transitions, max(one.rounding for one in rewards), centred=True)
+    return _estimated(values, transitions, (rewards[0].rounding, rewards[1].rounding), centred=True)
 
 
 def sampled_starc(
@@ -117,7 +117,8 @@ def sampled_starc(
         gains = _returns(rewards, model, policy, many, begin, gamma, steps, rng)
         gains -= _returns(rewards, model, policy, many, None, gamma, steps, rng)
         values[:, :, done : done + k] = gains.reshape(2, -1, k)
-    return _estimated(values, transitions, max(one.rounding for one in rewards) / (1 - gamma), centred=False)
+    rounding = (rewards[0].rounding / (1 - gamma), rewards[1].rounding / (1 - gamma))
+    return _estimated(values, transitions, rounding, centred=False)
 
 
 def _returns(
@@ -156,7 +157,7 @@ def _acted(policy: Acting, here: np.ndarray, rng: np.random.Generator) -> np.nda
     return np.asarray(found)
 
 
-def _estimated(values: np.ndarray, transitions: Transitions, rounding: float, *, centred: bool) -> Distance:
+def _estimated(values: np.ndarray, transitions: Transitions, rounding: Roundings, *, centred: bool) -> Distance:
     """The distance of replicated canonical values (2, N, K), and its error."""
     block = transitions.blocks(BLOCKS)
 

@@ -82,6 +82,14 @@ def test_a_scaled_reward_is_at_distance_0(name):
     assert max(found.value, found.error) < 1e-6 and found.n >= 200
 
 
+@pytest.mark.parametrize("scale", [1e-40, 1e40])
+@pytest.mark.parametrize("name", list(EXACT))
+def test_a_reward_of_another_scale_is_as_far_away(name, scale):
+    a, b = rewards_of(CONTINUING)
+    near, far = (estimate(name, CONTINUING, 0, function(a), function(factor * b)) for factor in (1.0, scale))
+    assert far.value == pytest.approx(near.value)
+
+
 @pytest.mark.parametrize("model", [CONTINUING, ENDING], ids=["continuing", "ending"])
 def test_shaping_is_at_distance_0_but_for_the_draws_with_sampled_epic(model):
     R = rewards_of(model)[0]

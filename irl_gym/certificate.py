@@ -52,7 +52,8 @@ class Certificate(Proven):
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     margin: Vector
-    """(S,) smallest margin of the expert over another action; NaN where (4) has no row that R can move."""
+    """(S,) smallest margin of the expert over another action, over the rows of (4) that R can move and that are not listed as
+    unbreakable; NaN where there is none."""
     objective: float
     """The LP's objective at R, recomputed."""
     dual_bound: float
@@ -77,6 +78,10 @@ class Certificate(Proven):
     """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
     marginless: Indices
     """Reachable states with rows but without a positive margin under R."""
+    unbreakable: Indices
+    """States with a row that no reward makes strict while the expert is optimal everywhere, as a program found."""
+    unbreakable_rows: np.ndarray
+    """(u, 2) state and action of each such row: left out of `margin`, one by one. Where no program asked, it is empty."""
     slack: float | None = None
     """C, the price of a violation of (4); None where rows are hard."""
     unknown: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -116,6 +121,9 @@ class Certificate(Proven):
             )
         if self.marginless.size:
             lines.append(f"no margin                in {self.marginless.size} states, where ties remain")
+        if self.unbreakable.size:
+            count, states = len(self.unbreakable_rows), self.unbreakable.size
+            lines.append(f"unbreakable              {count} rows of (4), in {states} states, that no such reward makes strict")
         if self.violated.size:
             count, states, most = self.violations.size, self.violated.size, self.violations.max()
             lines.append(f"violated                 {count} rows of (4), in {states} states, by at most {most:.2e}")
@@ -173,7 +181,8 @@ def certify(
     l1: float = 0.0,
     lambda_0: float | None = None,
     margin_cap: float | None = None,
-    counted: Indices | None = None,
+    counted: np.ndarray | None = None,
+    unbreakable: np.ndarray | None = None,
     y: np.ndarray | None = None,
     y_l1: np.ndarray | None = None,
 ) -> Certificate:
@@ -187,9 +196,10 @@ def certify(
         l1: lambda of the LP's objective.
         lambda_0: reported as given.
         margin_cap: cap tau of the margins, None for Ng & Russell's LP (in which a trivial row makes a state's margin 0).
-        counted: states whose margins are in the objective; None for all with a row.
-        y: (n,) duals of the rows of (4) among the reachable states, in the order of `comparisons.compare`; any values give a
-            valid bound.
+        counted: (n,) rows of (4) among the reachable states, in the order of `comparisons.compare`, whose margins are in the
+            objective, each state's least one; None for all that R can move.
+        unbreakable: (n,) rows that no reward makes strict, which `margin` leaves out; None where no program asked.
+        y: (n,) duals of the same rows; any values give a valid bound.
         y_l1: (n,) duals of the program that makes ||R||_1 least with all margins at the cap.
 
     Raises:
@@ -206,14 +216,12 @@ def certify(
     R = TabularReward(reward.values[rows])
     values = row_margins(part, comparisons, R, discounted)
     usable = comparable(comparisons, R)
-    least = least_per_state(values[usable], comparisons.states[usable], part.n_states)
-    if y is not None:  # a trivial row bounds no margin, so its dual may not tighten D(y)
-        y = np.where(usable | comparisons.equal, y, 0.0)
+    spoilt = comparisons.states[comparisons.trivial & ~usable & ~comparisons.equal & (margin_cap is None)]
+    counted = usable & (~np.isin(comparisons.states, spoilt) if counted is None else counted)
     violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))
-    objective_states = _objective_states(comparisons, usable, margin_cap, counted, rows)
-    margins = least[objective_states]
-    total = float(np.minimum(margins, np.inf if margin_cap is None else margin_cap).sum())
-    dual = DualBound(part, comparisons, discounted, R.on_states, objective_states, r_max, l1, margin_cap)
+    margins = least_per_state(values[counted], comparisons.states[counted], part.n_states)
+    total = float(np.nansum(np.minimum(margins, np.inf if margin_cap is None else margin_cap)))
+    dual = DualBound(part, comparisons, discounted, R.on_states, counted, r_max, l1, margin_cap)
     return Certificate(
         objective=total - l1 * float(np.abs(R.values).sum()),
         dual_bound=dual.bound(y),
@@ -221,14 +229,14 @@ def certify(
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if margin_cap is None else float(margin_cap),
         least_l1_norm=dual.least_l1_norm(y_l1),
-        unconstrained=rows[np.isnan(least) & ~part.terminal],
-        **judged(mdp, part, rows, comparisons, R, least, violations, r_max),
+        unconstrained=rows[np.setdiff1d(np.flatnonzero(~part.terminal), comparisons.states[usable])],
+        **judged(mdp, part, rows, comparisons, R, values, violations, r_max, unbreakable),
     )
 
 
 def judged(
-    mdp: TabularMDP, part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, least: np.ndarray,
-    violations: np.ndarray, r_max: float, visits: np.ndarray | None = None,
+    mdp: TabularMDP, part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, values: np.ndarray,
+    violations: np.ndarray, r_max: float, unbreakable: np.ndarray | None, visits: np.ndarray | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a certificate that do not depend on the program.
 
@@ -238,14 +246,19 @@ def judged(
         rows: (r,) the states of the whole that are in the part.
         comparisons: the rows of (4) in the part.
         R: the reward on the part.
-        least: (r,) smallest margin of each state.
+        values: (n,) margin of each row of (4).
         violations: (n,) of each row of (4).
         r_max: bound on |R|.
+        unbreakable: (n,) rows that no reward makes strict; None where no program asked.
         visits: (S,) how often each state was visited; None when that is not known.
     """
     rounding, worst = tolerated(R.largest(part), mdp.gamma), float(violations.max(initial=0.0))
     paid = R.values if R.on_states else R.values[~part.terminal]
     tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
+    usable = comparable(comparisons, R)
+    left_out = usable & (np.zeros_like(usable) if unbreakable is None else unbreakable)
+    kept = usable & ~left_out
+    least = least_per_state(values[kept], comparisons.states[kept], part.n_states)
     margin = np.full(mdp.n_states, np.nan)
     margin[rows] = least
     return {
@@ -257,6 +270,8 @@ def judged(
         "zero": bool(np.abs(paid).max(initial=0.0) <= 1e-9 * r_max),
         "inseparable": rows[np.unique(tied)],
         "marginless": rows[least <= rounding],
+        "unbreakable": rows[np.unique(comparisons.states[left_out])],
+        "unbreakable_rows": _pairs(comparisons, rows, left_out),
         **violated_rows(violations, rounding, comparisons, rows, visits),
     }
 
@@ -274,19 +289,12 @@ def violated_rows(
     states = rows[comparisons.states[which]].astype(np.int64)
     return {
         "violated": np.unique(states),
-        "violated_rows": np.stack([states, comparisons.actions[which].astype(np.int64)], axis=1),
+        "violated_rows": _pairs(comparisons, rows, which),
         "violations": violations[which],
         "violated_visits": np.full(which.size, np.nan) if visits is None else visits[states].astype(np.float64),
     }
 
 
-def _objective_states(
-    comparisons: Comparisons, usable: np.ndarray, cap: float | None, counted: np.ndarray | None, rows: np.ndarray
-) -> np.ndarray:
-    """States whose margins are summed: those counted; without a cap, none with a trivial row, whose margin is 0."""
-    states = np.unique(comparisons.states[usable])
-    if cap is None:
-        states = np.setdiff1d(states, comparisons.states[~usable & ~comparisons.equal])
-    if counted is not None:
-        states = np.intersect1d(states, np.flatnonzero(np.isin(rows, counted)))
-    return states
+def _pairs(comparisons: Comparisons, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """(k, 2) state of the whole MDP and action of some rows of (4)."""
+    return np.stack([rows[comparisons.states[which]], comparisons.actions[which]], axis=1).astype(np.int64)

@@ -2,8 +2,8 @@
 
 For *any* y >= 0 on the rows of (4)
     D(y) = sum_s T (1 - sum_a y(s, a))+  +  R_max sum_i (|c_i| - l1)+
-is above every objective, where T bounds a margin (the cap, or 2 R_max / (1 - gamma)) and c is the gradient of
-sum y margins with respect to R. So D(y) - objective bounds what a reward falls short of the optimum.
+is above every objective, where sum_a is over the rows that count, T bounds a margin (the cap, or 2 R_max / (1 - gamma)) and c
+is the gradient of sum y margins with respect to R. So D(y) - objective bounds what a reward falls short of the optimum.
 Axes: S states, A actions, n rows of (4).
 """
 
@@ -25,7 +25,8 @@ class DualBound:
     comparisons: Comparisons
     discounted: Discounted
     on_states: bool
-    objective_states: np.ndarray
+    counted: np.ndarray
+    """(n,) rows whose margins count: in the objective each state has the least of its own."""
     r_max: float
     l1: float
     cap: float | None
@@ -43,20 +44,19 @@ class DualBound:
         """D(y), for y >= 0 on the inequalities."""
         mdp, comparisons = self.mdp, self.comparisons
         most = 2 * self.r_max / (1 - mdp.gamma) if self.cap is None else self.cap
-        weights = np.where(comparisons.equal, 0.0, y)
-        per_state = np.bincount(comparisons.states, weights=weights, minlength=mdp.n_states)
-        slack = most * float(np.maximum(1 - per_state[self.objective_states], 0.0).sum())
+        states, of_row = np.unique(comparisons.states[self.counted], return_inverse=True)
+        per_state = np.bincount(of_row, weights=y[self.counted], minlength=states.size)
+        slack = most * float(np.maximum(1 - per_state, 0.0).sum())
         return slack + self.r_max * float(np.maximum(np.abs(self.gradient(y)) - self.l1, 0.0).sum())
 
     def least_l1_norm(self, y: np.ndarray | None) -> float:
         """Lagrange's bound below every ||R||_1 with all margins at the cap: cap sum(y) - R_max sum_i (|c_i| - 1)+."""
         if y is None or self.cap is None:
             return float("nan")
-        counted = np.isin(self.comparisons.states, self.objective_states) & ~self.comparisons.equal
         bounds = []
         for signed in self._signed(y):
             beyond = np.maximum(np.abs(self.gradient(signed)) - 1, 0.0).sum()
-            bounds.append(self.cap * float(signed[counted].sum()) - self.r_max * float(beyond))
+            bounds.append(self.cap * float(signed[self.counted].sum()) - self.r_max * float(beyond))
         return max(bounds)
 
     def gradient(self, y: np.ndarray) -> np.ndarray:

@@ -190,7 +190,7 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
-STATE_LISTS = ("inseparable", "marginless", "unconstrained", "unknown", "violated")
+STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 

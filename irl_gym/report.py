@@ -236,6 +236,10 @@ def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         on_states = reward.get("reward_on") == "state"
         mend = " Try --margin-cap auto." if cap is None else " Try --reward-on state-action." if on_states else ""
         yield "states where it leaves ties", f"{ties}: the expert has no margin there.{mend}"
+    if reward.get("unbreakable_states"):
+        kind = "state reward" if reward.get("reward_on") == "state" else "reward"
+        told = f"there no {kind} that makes the expert optimal prefers its action to some other."
+        yield "states with lasting ties", f"{reward['unbreakable_states']}: {told}"
     if reward["inseparable_states"]:
         share = reward.get("worst_tie_regret_share")
         mend = " Try --reward-on state-action." if share is not None and share > HARM else ""

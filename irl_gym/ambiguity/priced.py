@@ -144,7 +144,7 @@ class PricedProgram:
     def bound(self, y: np.ndarray, price: float) -> float:
         """No reward is worth more at this price; valid for any duals y (n,) of the rows of (4)."""
         dual = DualBound(
-            self.part, self.comparisons, self.discounted, self.on_states, self.states, self.r_max, float(price), self.cap
+            self.part, self.comparisons, self.discounted, self.on_states, self.counted, self.r_max, float(price), self.cap
         )
         y = np.where(self.comparisons.equal, y, np.maximum(y, 0.0))
         sums = np.bincount(self.comparisons.states[self.counted], y[self.counted], self.part.n_states)

@@ -226,12 +226,16 @@ class Case:
         return replace(FiniteLP(reward_on=kind, unvisited=unvisited), **changes)
 
     @cached_property
-    def can_have_margin(self) -> StateMask | None:
-        """(S,) states in which some reward gives the expert a margin; None where that is not known."""
+    def can_have_margin(self) -> ActionSets | None:
+        """(S, A) rows of (4) that some reward makes strict; None where that is not known."""
         if self.best is None or isinstance(self.best, DegenerateExpert):
             return None
         certificate = self.best.certificate
-        return np.nan_to_num(certificate.margin) > certificate.margin_cap / 2
+        possible = (np.nan_to_num(certificate.margin) > certificate.margin_cap / 2)[:, None].repeat(
+            self.distribution.shape[1], axis=1
+        )
+        possible[tuple(certificate.unbreakable_rows.T)] = False
+        return possible
 
     @cached_property
     def best(self) -> IRLResult | DegenerateExpert | None:

@@ -31,13 +31,13 @@ def capped(case: Case) -> Mend | None:
     return 'margin_cap="auto" with l1=0.0', ("--margin-cap auto", "--l1 0")
 
 
-def breaking(case: Case, states: Indices) -> Mend:
-    """What breaks ties in states (k,) where the expert is known: another program, or another kind of reward.
+def breaking(case: Case, states: Indices, actions: Indices) -> Mend:
+    """What breaks ties with actions (k,) in states (k,) where the expert is known: another program, or another kind of reward.
 
     Whether a program breaks them is known where one was solved here; else what may break them is named, and what comes next.
     """
     possible, other = case.can_have_margin, capped(case)
-    broken = np.ones(states.size, dtype=bool) if possible is None else possible[states]
+    broken = np.ones(states.size, dtype=bool) if possible is None else possible[states, actions]
     if case.linear and broken.any():
         if case.claims.get("margin_cap") is None:
             return 'margin_cap="auto"; if it stays, more or other features, or FiniteLP.', ("--margin-cap auto",)
@@ -45,11 +45,11 @@ def breaking(case: Case, states: Indices) -> Mend:
     if other is not None and broken.any():
         program, flags = other
         if possible is not None and broken.all():
-            return f"{program}: solved here, it gives the expert a margin in each of these states.", flags
+            return f"{program}: solved here, it gives the expert a margin over each of these actions.", flags
         left = 'reward_on="state-action"' if case.on_states else "the (S, A) set of the expert's optimal actions"
         return f"{program}; {left} where that leaves ties.", flags
     if possible is not None and broken.any():
-        return "Learn it again: solved here with the same settings, the expert has a margin in some of these states.", ()
+        return "Learn it again: solved here with the same settings, the expert has a margin over some of these actions.", ()
     if case.on_states:
         return 'reward_on="state-action": a reward on states does not prefer the expert\'s actions there.', on_steps(case)
     return "Give the expert as the (S, A) set of its optimal actions.", ()

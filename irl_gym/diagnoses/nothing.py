@@ -106,7 +106,7 @@ def no_reward(case: Case) -> Finding | None:
     return Finding(
         "no-reward",
         "No reward came out, though there is one: FiniteLP() gives the expert a margin in "
-        f"{counted(int(case.can_have_margin.sum()))}.",
+        f"{counted(int(case.can_have_margin.any(axis=1).sum()))}.",
         "Run the learner; if it stopped, read its error: a time_limit, or rows that contradict each other.",
     )
 

@@ -84,7 +84,7 @@ def avoidable_ties(case: Case) -> Finding | None:
         return None
     though = "" if guessed else ", though some reward prefers it"
     told = f"In {{states}} the reward ties the expert with another action{though}: {{where}}. An agent may take either."
-    return _found("avoidable-ties", told, breaking(case, rows.states[which]), rows, which)
+    return _found("avoidable-ties", told, breaking(case, rows.states[which], rows.actions[which]), rows, which)
 
 
 def unbreakable_ties(case: Case) -> Finding | None:
@@ -112,5 +112,5 @@ def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:
     possible = case.can_have_margin
     if possible is None:
         return rows, which, none, True
-    broken = possible[rows.states[which]]
+    broken = possible[rows.states[which], rows.actions[which]]
     return rows, which[broken], which[~broken], False

@@ -153,4 +153,4 @@ def _break(case: Case, states: Indices, actions: np.ndarray) -> Mend:
             return told, on_steps(case)
     if not case.judges_states:
         return "More rounds or features, so that these actions lead to other features than the expert's.", ("--rounds",)
-    return breaking(case, states)
+    return breaking(case, states, actions)

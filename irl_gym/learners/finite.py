@@ -7,12 +7,12 @@ Given P, gamma and the expert's policy pi, find R under which pi is optimal, and
 Two modes:
 `margin_cap=None`  the paper's LP. It trades margins between states: some get none, and in these the expert is tied with
     actions that can be disastrous under the true reward.
-`margin_cap=tau`   Departs: each margin counts up to tau only, and rows that compare identical successors are left out (they
-    would force the margin of their state to 0). No state's margin is bought at another's expense.
-`margin_cap="auto"`  tau = half of eps*, the largest margin that every state can have at once. A cap of at most eps* is attained
-    in every state that can have a margin at all, so no tie is left that a reward could break; and half of it leaves an interior
-    of rewards that attain it, in which the l1 term finds the simplest. With l1 = 0 the reward is the limit l1 -> 0+ of the
-    capped LP: the least ||R||_1 with all margins at least tau, the optimum for every l1 below `stats["l1_limit"]`.
+`margin_cap=tau`   Departs: each margin counts up to tau only, and rows that no reward makes strict are left out one by one
+    (`strict_rows`; they would force the margin of their state to 0). No state's margin is bought at another's expense.
+`margin_cap="auto"`  tau = half of eps*, the largest margin that all other rows can have at once. A cap of at most eps* is
+    attained in each of them, so no tie is left that a reward on states breaks by more than R_max / 10^6; and half of it
+    leaves an interior of rewards that attain it, in which the l1 term finds the simplest. With l1 = 0 the reward is the limit
+    l1 -> 0+ of the capped LP: the least ||R||_1 with all margins at least tau, optimal for every l1 below `stats["l1_limit"]`.
 An expert that is known in some states only (rows of NaN), or that errs (`slack`), has the programs of `learners.soft`: (4) has
 rows in the states where it is known, and V is what acting best is worth, so that no policy is made up where none was seen and
 no unknown state is worth more than it earns.
@@ -28,7 +28,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym.certificate import Certificate, certify, least_per_state, row_margins
+from irl_gym.certificate import Certificate, certify, row_margins
 from irl_gym.checks import checked_number, float_array
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
@@ -37,6 +37,7 @@ from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.partial import PartialTask
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved, Solving
+from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import SolverName, Status, check_solving
@@ -112,13 +113,14 @@ class FiniteLP:
         if self.slack is not None or (acting & ~known).any():
             return PartialTask(self, mdp, known_expert, known, visits).fit()
         task, y_l1 = _Task(self, mdp, known_expert), None
+        largest = None if self.margin_cap is None else task.uniform_margin()
         lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
         l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
-        if self.margin_cap is None:
+        if largest is None:
             solved, cap = programs.ng_russell(task.program(), self.r_max, l1, None), None
             y = solved.y
         else:
-            cap = task.cap() if self.margin_cap == "auto" else float(self.margin_cap)
+            cap = largest / 2 if self.margin_cap == "auto" or self.margin_cap is None else float(self.margin_cap)
             if self.margin_cap == "auto" and l1 == 0:
                 solved = programs.sparsest(task.program(), self.r_max, cap)
                 task.stats["l1_limit"] = task.l1_limit(solved.y)
@@ -141,7 +143,10 @@ class FiniteLP:
         expert, known = completed(expert, mdp.n_states)
         if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
             return PartialTask(self, mdp, expert, known, None).lambda_0()
-        return _Task(self, mdp, expert).lambda_0()
+        task = _Task(self, mdp, expert)
+        if self.margin_cap is not None:
+            task.uniform_margin()
+        return task.lambda_0()
 
 
 def _checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
@@ -172,6 +177,7 @@ class _Task:
         self.comparisons: Comparisons = compare(self.part, np.asarray(expert)[self.rows])
         self.stats: dict[str, Any] = {"programs": {}}
         self.counted = self._candidates()
+        self.unbreakable = np.zeros_like(self.counted)
         if not self.counted.any():
             raise self._nothing_to_compare()
 
@@ -200,25 +206,31 @@ class _Task:
             raise self.degenerate()
         return solved.answer.objective
 
-    def cap(self) -> float:
-        """Half of the largest uniform margin; leaves in `counted` the rows of the states that can have one."""
+    def uniform_margin(self) -> float:
+        """The largest margin of all rows at once; leaves in `counted` the rows that can have one."""
         bound = self._uniform_bound()
         if bound is None:
-            served = programs.attainable(self.program(), LARGEST_BOUND)
-            self.record("attainable", served)
-            states = self._served(served)
-            self.stats["states_without_margin"] = np.unique(self.comparisons.states[self.counted]).size - states.size
-            self.counted = self.counted & np.isin(self.comparisons.states, states)
+            candidates = self.counted
+            self.counted = strict_rows(self.comparisons.states, candidates, self._serve)
+            self.unbreakable = candidates & ~self.counted
+            self.stats["rows_without_margin"] = int(self.unbreakable.sum())
             if not self.counted.any():
                 raise self.degenerate()
-            bound = self._uniform_bound(3 * LARGEST_BOUND)  # each has a margin above 1/2 at the bound
+            rounds = self.part.n_actions  # rewards of that many programs add up, each with margins above 1/2 at the bound
+            bound = self._uniform_bound((2 * rounds + 1) * LARGEST_BOUND)
             if bound is None:
-                raise SolverFailed("the states that can have a margin were found, but no uniform margin: report this table.")
+                raise SolverFailed("the rows that can have a margin were found, but no uniform margin: report this table.")
         self.stats["uniform_margin"] = self.learner.r_max / bound
-        return self.learner.r_max / bound / 2
+        return self.learner.r_max / bound
+
+    def _serve(self, rows: np.ndarray) -> np.ndarray:
+        self.counted = rows
+        solved = programs.attainable(self.program(), LARGEST_BOUND)
+        self.record("attainable", solved)
+        return row_margins(self.part, self.comparisons, TabularReward(solved.R))
 
     def _uniform_bound(self, largest: float = LARGEST_BOUND) -> float | None:
-        """Least bound on |R| for margins of 1 in all counted states; None if there is none, or only a larger one."""
+        """Least bound on |R| for margins of 1 in all counted rows; None if there is none, or only a larger one."""
         try:
             solved = programs.uniform_margin(self.program())
         except SolverInfeasible:
@@ -230,12 +242,6 @@ class _Task:
         """An l1 below which the sparsest reward stays optimal: where no margin's price in ||R||_1, times l1, is above 1."""
         prices = np.bincount(self.comparisons.states[self.counted], np.maximum(y[self.counted], 0))
         return 1 / max(float(prices.max()), 1e-300)
-
-    def _served(self, solved: Solved) -> np.ndarray:
-        c = self.comparisons
-        margins = row_margins(self.part, c, TabularReward(solved.R))
-        least = least_per_state(margins[self.counted], c.states[self.counted], self.part.n_states)
-        return np.flatnonzero(least > 0.5)
 
     def _nothing_to_compare(self) -> DegenerateExpert:
         c, where = self.comparisons, f"the {self.rows.size} reachable states"
@@ -268,7 +274,7 @@ class _Task:
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R
         reward = TabularReward(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
-        counted = self.rows[np.unique(self.comparisons.states[self.counted])]
-        certificate = certify(self.mdp, self.expert, reward, r_max=self.learner.r_max, counted=counted, **proof)
+        terms = {"r_max": self.learner.r_max, "counted": self.counted, "unbreakable": self.unbreakable}
+        certificate = certify(self.mdp, self.expert, reward, **terms, **proof)
         status = Status.ZERO if certificate.zero else solved.answer.status
         return IRLResult(reward, status, certificate.objective, certificate, self.stats)

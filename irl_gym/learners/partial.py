@@ -1,6 +1,7 @@
 """FiniteLP for an expert that is known in some states only, or that errs: which programs are solved, and in which order.
 
-The programs are those of `soft`. The cap "auto" is half of the largest margin that every state can have at once. Where the data
+The programs are those of `soft`. The cap "auto" is half of the largest margin that all rows can have at once, but those
+that no reward makes strict. Where the data
 contradict themselves no such margin exists, and with slack the states are found first whose rows it is best to give up: those
 violated when margins count up to R_max / 1000. The margin is then of the others, and all rows return to the last program.
 With l1 = 0 the reward is the limit l1 -> 0+: the least N with the margins of the best reward. That also sends states to avoid
@@ -18,6 +19,7 @@ from irl_gym.learners.base import IRLResult
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Solving
 from irl_gym.learners.soft import Found, PartlyKnown, SoftProgram
 from irl_gym.learners.soft_certificate import Terms, certify_partly
+from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import Status
@@ -57,6 +59,7 @@ class PartialTask:
         on_states = learner.reward_on == "state"
         active = ~c.trivial if on_states else np.ones(c.states.size, dtype=bool)
         self.counted = active & ~c.equal
+        self.unbreakable = np.zeros_like(active)
         if on_states and learner.margin_cap is None:
             self.counted &= ~np.isin(c.states, c.states[c.trivial & ~c.equal])
         avoided = np.zeros(part.n_states, dtype=bool)
@@ -108,7 +111,7 @@ class PartialTask:
             found = self.recorded("reward", self.program(soft=soft).simplest(r_max / unit, need))
             self.stats["price"] = -found.objective * unit
             self.stats["least_price"] = -found.bound * unit
-        return self._result(found, unit, bound, Terms(r_max, l1, cap, learner.slack, self.counted), lambda_0)
+        return self._result(found, unit, bound, Terms(r_max, l1, cap, learner.slack, self.counted, self.unbreakable), lambda_0)
 
     def recorded(self, name: str, found: Found) -> Found:
         """Note what the solver did."""
@@ -149,27 +152,33 @@ class PartialTask:
         if bound is None:
             if not hard.counted.any():
                 raise self.degenerate()
-            found = self.recorded("attainable", self._without(given_up).best(LARGEST_BOUND, 1.0, 0.0))
-            served = np.isin(c.states, np.flatnonzero(self._least(found, hard.counted) > 0.5))
-            self.stats["states_without_margin"] = int(np.unique(c.states[hard.counted & ~served]).size)
-            need[~served & ~given_up] = 0.0
-            if not given_up.any():
-                self.counted = self.counted & served
-            bound = self._uniform(hard, need, 3 * LARGEST_BOUND) if (served & hard.counted).any() else None
+            served = strict_rows(c.states, hard.counted, lambda rows: self._serve(given_up, rows))
+            unbreakable = hard.counted & ~served
+            self.stats["rows_without_margin"] = int(unbreakable.sum())
+            need[unbreakable] = 0.0
+            if not given_up.any():  # else they depend on what was given up
+                self.counted, self.unbreakable = self.counted & served, unbreakable
+            rounds = self.partly.mdp.n_actions
+            bound = self._uniform(hard, need, (2 * rounds + 1) * LARGEST_BOUND) if served.any() else None
             if bound is None:
                 raise self.degenerate()
         self.stats["uniform_margin"] = self.learner.r_max / bound
         self.stats["states_given_up"] = int(np.unique(c.states[given_up]).size)
         return self.learner.r_max / bound / 2, None if given_up.any() else need
 
-    def _without(self, given_up: np.ndarray) -> SoftProgram:
+    def _serve(self, given_up: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        program = self._without(given_up, rows)
+        return self._margins(self.recorded("attainable", program.best(LARGEST_BOUND, 1.0, 0.0)))
+
+    def _without(self, given_up: np.ndarray, counted: np.ndarray | None = None) -> SoftProgram:
         """The hard program in which the expert is not known where its rows were given up."""
         full, c = self.partly, self.partly.comparisons
         known = full.known.copy()
         known[c.states[given_up]] = False
         partly = PartlyKnown(full.mdp, c, known, full.avoided, full.weights, full.active & ~given_up)
         solving = Solving(self.learner.solver, self.learner.time_limit)
-        return SoftProgram(partly, self.learner.reward_on, self.counted & ~given_up, None, solving)
+        counted = self.counted & ~given_up if counted is None else counted
+        return SoftProgram(partly, self.learner.reward_on, counted, None, solving)
 
     def _uniform(self, program: SoftProgram, need: np.ndarray, largest: float = LARGEST_BOUND) -> float | None:
         try:
@@ -179,14 +188,16 @@ class PartialTask:
         return bound if 0 < bound < largest else None
 
     def _least(self, found: Found, rows: np.ndarray) -> np.ndarray:
-        """(S,) the smallest margin of some rows, from V and R as solved; NaN where there is none."""
+        """(S,) the smallest margin of some rows; NaN where there is none."""
+        return least_per_state(self._margins(found)[rows], self.partly.comparisons.states[rows], self.partly.mdp.n_states)
+
+    def _margins(self, found: Found) -> np.ndarray:
+        """(n,) of all rows, from V and R as solved."""
         mdp, c = self.partly.mdp, self.partly.comparisons
         if self.learner.reward_on == "state":
-            margins = c.rows @ found.V
-        else:
-            stacked = c.states * mdp.n_actions + c.actions
-            margins = found.V[c.states] - found.R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ found.V)
-        return least_per_state(margins[rows], c.states[rows], mdp.n_states)
+            return c.rows @ found.V
+        stacked = c.states * mdp.n_actions + c.actions
+        return found.V[c.states] - found.R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ found.V)
 
     def _needed(self, best: Found, cap: float | None) -> np.ndarray:
         """(n,) what each row needs so that no state has less than under the best reward, in units of the cap or R_max."""

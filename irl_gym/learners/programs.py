@@ -28,7 +28,7 @@ JUST_BELOW = 1 - 1e-3
 NO_MARGIN = 1e-9
 """A margin below this, relative to R_max, is none: it is the solvers' rounding."""
 LARGEST_BOUND = 1e6
-"""A margin below R_max over this is none: such a state is left out of the uniform margin."""
+"""A margin below R_max over this is none: such a row is left out of the uniform margin."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def critical_l1(program: Program) -> Solved:
 
 
 def uniform_margin(program: Program) -> Solved:
-    """The largest margin that every state can have at once, with |R| <= 1: maximise eps, margins >= eps.
+    """The largest margin that all rows that count can have at once, with |R| <= 1: maximise eps, margins >= eps.
 
     Solved for its reciprocal, the least bound r on |R| with all margins at least 1, which is well scaled however small eps.
     The answer's objective is r; eps = 1 / r.

@@ -29,6 +29,8 @@ class Terms:
     slack: float | None
     counted: np.ndarray
     """(n,) rows that count towards margins."""
+    unbreakable: np.ndarray
+    """(n,) rows that no reward makes strict."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,6 @@ def certify_partly(
     R = TabularReward(reward.values[rows])
     found = judge(partly, R, terms.r_max)
     usable = comparable(c, R)
-    least = least_per_state(found.margins[usable], c.states[usable], part.n_states)
     short = np.where(partly.active, np.maximum(-found.margins, 0.0), 0.0)
     return Certificate(
         objective=objective(partly, found, terms),
@@ -114,8 +115,8 @@ def certify_partly(
         lambda_0=None if lambda_0 is None else float(lambda_0),
         margin_cap=None if terms.cap is None else float(terms.cap),
         least_l1_norm=float("nan"),
-        unconstrained=rows[np.isnan(least) & partly.known],
+        unconstrained=rows[np.setdiff1d(np.flatnonzero(partly.known), c.states[usable])],
         slack=None if terms.slack is None else float(terms.slack),
         unknown=rows[partly.unknown],
-        **judged(mdp, part, rows, c, R, least, short, terms.r_max, visits),
+        **judged(mdp, part, rows, c, R, found.margins, short, terms.r_max, terms.unbreakable, visits),
     )

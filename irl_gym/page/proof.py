@@ -140,6 +140,7 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
 _COUNTS = {
     "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
     "marginless": ("Without a margin", "the expert is only tied with another action"),
+    "unbreakable": ("Always tied", "some action ties with the expert's under every such reward that makes the expert optimal"),
     "unknown": ("Expert not seen", "nothing is asked of its actions there"),
     "violated": ("Violated", "another action is better there under the learned reward"),
     "unconstrained": ("Without a comparison", "all actions do the same there"),

@@ -36,9 +36,10 @@ def test_states_that_cannot_have_a_margin_are_left_out_and_counted():
     P[1] = [[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     P[2] = [[0, 0, 0, 1]] * 3
     found = FiniteLP().fit(TabularMDP.from_dense(P, 0.9, [1.0, 0, 0, 0]), np.zeros(4, dtype=int))
-    assert found.stats["states_without_margin"] == 1
+    assert found.stats["rows_without_margin"] == 2
     assert found.certificate.margin[1] >= found.certificate.margin_cap * (1 - 1e-6)
-    assert found.certificate.marginless.tolist() == [0]
+    assert found.certificate.unbreakable_rows.tolist() == [[0, 1], [0, 2]]
+    assert found.certificate.unbreakable.tolist() == [0] and found.certificate.marginless.size == 0
 
 
 @given(model=models.models())

@@ -8,9 +8,10 @@ from scipy.optimize import linprog
 
 
 def soft_lp(P, gamma, expert, *, weights, slack=None, cap=None, l1=0.0, r_max=1.0, avoided=()):
-    """Maximise sum_s w_s (t_s - C xi_s) - l1 N; returns the objective. Unknowns: V (S), t (S), xi (S), N's terms p (S), q (S).
+    """Maximise sum_s w_s (t_s - C xi_s - C eta_s) - l1 N; returns it. Unknowns: V, t, xi, eta and N's terms p and q, (S) each.
 
-    subject to  (P_pi(s) - P_a(s)) V >= t_s - xi_s     known s, a != pi(s) with other successors than pi's
+    subject to  (P_pi(s) - P_a(s)) V >= t_s - xi_s     known s, a that pi does not take, with other successors than pi's
+                (P_pi(s) - P_a(s)) V >= -eta_s         known s, a that pi takes too
                 r_a(s) >= -r_max,  r_pi(s) <= r_max    r_a = V - gamma P_a V; pi uniform where not known
                 N = sum of p_s >= r_pi(s)+ and q_s >= -r_a(s) for all a; of r_pi(s) + r_max where avoided
     """
@@ -21,7 +22,7 @@ def soft_lp(P, gamma, expert, *, weights, slack=None, cap=None, l1=0.0, r_max=1.
     pi = np.where(known[:, None], expert, 1 / A)
     P_pi = np.einsum("sa,sat->st", pi, P)
     r_pi = eye - gamma * P_pi
-    rows, right, with_margin, with_row = [], [], set(), set()
+    rows, right, with_margin = [], [], set()
     for s in np.flatnonzero(known):
         taken = np.flatnonzero(expert[s] > 0)
         for a in range(A):
@@ -29,26 +30,28 @@ def soft_lp(P, gamma, expert, *, weights, slack=None, cap=None, l1=0.0, r_max=1.
             if np.abs(row).max() < 1e-12:
                 continue
             gains = a not in taken
-            (with_margin.add(s) if gains else None, with_row.add(s))
-            rows.append(np.concatenate([-row, gains * eye[s], -(slack is not None) * eye[s], zero, zero]))
+            if gains:
+                with_margin.add(s)
+            soft = (slack is not None) * eye[s]
+            rows.append(np.concatenate([-row, gains * eye[s], -gains * soft, -(not gains) * soft, zero, zero]))
             right.append(0.0)
     for s in range(S):
-        rows.append(np.concatenate([r_pi[s], zero, zero, zero, zero]))
+        rows.append(np.concatenate([r_pi[s], zero, zero, zero, zero, zero]))
         right.append(r_max)
-        rows.append(np.concatenate([r_pi[s], zero, zero, -eye[s], zero]))
+        rows.append(np.concatenate([r_pi[s], zero, zero, zero, -eye[s], zero]))
         right.append(0.0)
         for a in range(A):
             r_a = eye[s] - gamma * P[s, a]
-            rows.append(np.concatenate([-r_a, zero, zero, zero, zero]))
+            rows.append(np.concatenate([-r_a, zero, zero, zero, zero, zero]))
             right.append(r_max)
-            rows.append(np.concatenate([-r_a, zero, zero, zero, -eye[s]]))
+            rows.append(np.concatenate([-r_a, zero, zero, zero, zero, -eye[s]]))
             right.append(0.0)
     gain = np.array([weights[s] if s in with_margin else 0.0 for s in range(S)])
-    price = np.array([(slack or 0.0) * weights[s] if s in with_row else 0.0 for s in range(S)])
+    price = (slack or 0.0) * np.asarray(weights)
     low = np.isin(np.arange(S), avoided)
-    cost = np.concatenate([l1 * r_pi.T @ low, -gain, price, l1 * ~low, l1 * ~low])
+    cost = np.concatenate([l1 * r_pi.T @ low, -gain, price, price, l1 * ~low, l1 * ~low])
     t_bounds = [(0, cap if s in with_margin else 0) for s in range(S)]
-    bounds = [(None, None)] * S + t_bounds + [(0, None)] * (3 * S)
+    bounds = [(None, None)] * S + t_bounds + [(0, None)] * (4 * S)
     found = linprog(cost, A_ub=np.array(rows), b_ub=np.array(right), bounds=bounds, method="highs")
     assert found.success, found.message
     return -found.fun - l1 * r_max * low.sum()

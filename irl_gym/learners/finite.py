@@ -20,6 +20,8 @@ no unknown state is worth more than it earns.
     returns to what the expert was seen to do. It is a choice, not knowledge: nothing says that these states are bad.
 `slack=C`  a violation of (4) costs C, where a margin is worth 1, both in proportion to `visits`. With C large the rows are hard
     again wherever they can hold. The certificate lists the rows that are violated.
+    Actions that the expert takes too, when it takes several, have to be as good: what violates that costs C as well, and adds
+    nothing to a margin.
 Axes: S states, A actions.
 """
 

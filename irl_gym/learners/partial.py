@@ -200,11 +200,15 @@ class PartialTask:
         return found.V[c.states] - found.R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ found.V)
 
     def _needed(self, best: Found, cap: float | None) -> np.ndarray:
-        """(n,) what each row needs so that no state has less than under the best reward, in units of the cap or R_max."""
-        c = self.partly.comparisons
-        least = np.minimum(self._least(best, self.partly.active)[c.states], 0.0)
+        """(n,) what each row needs so that no state has less than under the best reward, in units of the cap or R_max.
+
+        Rows that count and rows that do not are apart, as in the program: each kind has its own violation.
+        """
+        c, others = self.partly.comparisons, self.partly.active & ~self.counted
+        least = np.minimum(self._least(best, others)[c.states], 0.0)
         counted = np.minimum(self._least(best, self.counted)[c.states], np.inf if cap is None else 1.0)
-        need = np.where(self.counted & (least > -LEEWAY), np.maximum(counted - LEEWAY, 0.0), least)
+        kept = np.where(counted > -LEEWAY, np.maximum(counted - LEEWAY, 0.0), counted)
+        need = np.where(self.counted, kept, least)
         short = need < -LEEWAY
         need[short] -= LEEWAY / (self.learner.slack or 1.0)  # a violation costs C
         need[~short & (need < 0)] = 0.0

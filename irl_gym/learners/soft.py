@@ -6,17 +6,23 @@ For an expert known in all states that satisfies (4) this is its own value (5), 
 
     unknowns     V (S,), and R read off it: R(s) = min_a r_a(s), r_a = (I - gamma P_a) V
                  t (m,) >= 0     margin of each state that counts, up to the cap
-                 xi (k,) >= 0    violation of (4) in each state; none where rows are hard
-    maximise     sum_s w_s (t_s - C xi_s) - l1 N
-    subject to   (4): (P_pi(s) - P_a(s)) V >= t_s - xi_s       in states where the expert is known, and nowhere else
+                 xi (m,) >= 0    violation of the rows that count, in each of these states; none where rows are hard
+                 eta (k,) >= 0   violation of the other rows, in each state that has some: the equalities of (4), first of all
+    maximise     sum_s w_s (t_s - C xi_s - C eta_s) - l1 N
+    subject to   (4): (P_pi(s) - P_a(s)) V >= t_s - xi_s       rows that count: of actions that the expert leaves out
+                      (P_pi(s) - P_a(s)) V >= -eta_s           other rows: of actions that it takes too, so that all are equal
+                 both in states where the expert is known, and nowhere else
                  r_a(s) >= -R_max for each a,  r_pi(s) <= R_max    so that |R| <= R_max; pi is uniform where it is not known
                  N = sum_s r_pi(s)+ + max_a (-r_a(s))+, which is ||R||_1 where (4) holds
+The violations of the two kinds are priced each on its own: were one xi_s the worst of both, an equality that is violated
+anyhow would lift t_s by as much, a margin that the reward does not have.
 So the margins are differences of what actions are truly worth under R. No policy is invented where none was seen, and no
-state can hold a value that acting in it does not earn. gamma xi_s is what the expert's action loses at once in s.
+state can hold a value that acting in it does not earn. gamma xi_s is what the expert's action loses at once in s
+against those that it leaves out.
 States "to avoid" (never seen, or terminal and not entered from a known state by the expert's actions) cost r_pi(s) + R_max
 in N instead: they are worth as little as the margins allow, and an agent that strays into them returns to what it knows.
 Departs: l1 prices ||R||_1 itself in the paper; N is the convex function above it.
-Axes: S states, A actions, n rows of (4), m states with a margin, k states with rows, x all unknowns in a vector.
+Axes: S states, A actions, n rows of (4), m states with a margin, k states with other rows, x all unknowns in a vector.
 """
 
 from collections.abc import Mapping
@@ -88,7 +94,7 @@ class SoftProgram:
         self.partly, self.solving, self.counted, self.slack = partly, solving, counted, slack
         self.on_states = reward_on == "state"
         self.states = np.unique(c.states[counted])
-        self.violable = np.unique(c.states[partly.active])
+        self.others = np.unique(c.states[partly.active & ~counted])
         identity = sp.eye_array(mdp.n_states, format="csr")
         self.r_pi = sp.csr_array(identity - mdp.gamma * mdp.P_pi(c.distribution))
         self.stepped = partly.known if not self.on_states else np.zeros(mdp.n_states, dtype=bool)  # R(s, a) in these
@@ -100,7 +106,8 @@ class SoftProgram:
         parts.cost["t"][:] = weights[self.states]
         parts.upper["t"][:] = np.inf if cap is None else cap
         if self.slack is not None:
-            parts.cost["xi"][:] = -self.slack * weights[self.violable]
+            parts.cost["xi"][:] = -self.slack * weights[self.states]
+            parts.cost["eta"][:] = -self.slack * weights[self.others]
         return self._found(parts, l1, np.zeros(self.counted.size), norm)
 
     def least_bound(self, need: np.ndarray) -> Found:
@@ -137,6 +144,12 @@ class SoftProgram:
         return np.clip(R, -most, most)
 
 
+def _picked(states: np.ndarray, among: np.ndarray, rows: np.ndarray) -> sp.csr_array:
+    """(n, m) of each of some rows the position of its state in `among` (m,), increasing; nothing in the other rows."""
+    at = np.searchsorted(among, states).clip(max=among.size - 1)
+    return sp.csr_array(sp.diags_array(rows.astype(float)) @ picking(at, among.size))
+
+
 class _Parts:
     """The unknowns of one program by name, and its rows as they are added.
 
@@ -154,7 +167,8 @@ class _Parts:
         sizes = {
             "V": S,
             "t": program.states.size if gains else 0,
-            "xi": program.violable.size if soft else 0,
+            "xi": program.states.size if soft else 0,
+            "eta": program.others.size if soft else 0,
             "pos": parts,
             "neg": parts,
             "bound": int(bound is None),
@@ -164,7 +178,7 @@ class _Parts:
         self.sizes: Mapping[str, int] = sizes
         largest = np.inf if bound is None else bound
         value, most = largest / (1 - gamma), 2 * largest / (1 - gamma)
-        boxes = {"V": value, "t": most, "xi": most, "pos": largest, "neg": largest, "bound": np.inf}
+        boxes = {"V": value, "t": most, "xi": most, "eta": most, "pos": largest, "neg": largest, "bound": np.inf}
         self.cost = {name: np.zeros(size) for name, size in sizes.items()}
         self.lower = {name: np.full(size, -np.inf if name == "V" else 0.0) for name, size in sizes.items()}
         self.upper = {name: np.full(size, largest if name in ("pos", "neg") else np.inf) for name, size in sizes.items()}
@@ -184,7 +198,7 @@ class _Parts:
             self.right.append(right)
 
     def margins(self, need: np.ndarray) -> None:
-        """(4): (P_pi - P_a) V - t + xi >= need in the rows that are not left out."""
+        """(4): (P_pi - P_a) V - t + xi >= need, or + eta in rows that do not count; for the rows that are not left out."""
         program, partly = self.of, self.of.partly
         mdp, c = partly.mdp, partly.comparisons
         chosen = np.flatnonzero(partly.active & ~np.isnan(need))
@@ -197,11 +211,13 @@ class _Parts:
             columns = self.steps.start + np.searchsorted(np.flatnonzero(program.stepped), states) * mdp.n_actions
             blocks["pos"] = picking(columns + c.actions[chosen], self.sizes["pos"])
             blocks["neg"] = -blocks["pos"]
+        counted = program.counted[chosen]
         if self.sizes["t"]:
-            at = np.searchsorted(program.states, states).clip(max=program.states.size - 1)
-            blocks["t"] = sp.csr_array(sp.diags_array(program.counted[chosen].astype(float)) @ picking(at, self.sizes["t"]))
+            blocks["t"] = _picked(states, program.states, counted)
         if self.sizes["xi"]:
-            blocks["xi"] = -picking(np.searchsorted(program.violable, states), self.sizes["xi"])
+            blocks["xi"] = -blocks["t"]
+        if self.sizes["eta"]:
+            blocks["eta"] = -_picked(states, program.others, ~counted)
         self.add(-need[chosen], **blocks)
 
     def bounds(self) -> None:

@@ -71,12 +71,17 @@ def _spread(partly: PartlyKnown, R: TabularReward) -> Vector:
 
 
 def objective(partly: PartlyKnown, found: Judged, terms: Terms) -> float:
-    """sum_s w_s (min(margin+, cap) - C violation) - l1 N, at the reward."""
-    S, c = partly.mdp.n_states, partly.comparisons
-    counted = least_per_state(found.margins[terms.counted], c.states[terms.counted], S)
-    least = least_per_state(found.margins[partly.active], c.states[partly.active], S)
-    gains = np.clip(np.where(np.isnan(counted), 0.0, counted), 0.0, np.inf if terms.cap is None else terms.cap)
-    short = np.maximum(-np.where(np.isnan(least), 0.0, least), 0.0) * (terms.slack or 0.0)
+    """sum_s w_s (min(margin+, cap) - C margin- - C the worst violation of other rows) - l1 N, at the reward.
+
+    A margin is the least over the rows that count; the other rows are those of actions that the expert takes too, first of all.
+    """
+    c, others = partly.comparisons, partly.active & ~terms.counted
+    margin, other = (
+        np.nan_to_num(least_per_state(found.margins[rows], c.states[rows], partly.mdp.n_states))
+        for rows in (terms.counted, others)
+    )
+    gains = np.clip(margin, 0.0, np.inf if terms.cap is None else terms.cap)
+    short = (np.maximum(-margin, 0.0) + np.maximum(-other, 0.0)) * (terms.slack or 0.0)
     return float(partly.weights @ (gains - short)) - terms.l1 * found.price
 
 

@@ -22,7 +22,7 @@ LIMITS = {"max_states": 50, "max_seconds": 1e-9, "max_bytes": 20_000}
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_limit_says_how_far_the_search_came_and_how_to_raise_it(name):
     message = (
-        r"stopped at \d+ states found, \d+ of them tried, after 0 s, at 0\.00 GB: expected at most "
+        r"stopped at \d+ states found, \d+ of them tried, after \d+ s, at 0\.00 GB: expected at most "
         rf"{name}=\S+\. Raise it, as in `tabulate\(env, gamma=\.\.\., by=Enumeration\({name}=\.\.\.\)\)`; with a `checkpoint`"
     )
     with pytest.raises(EnumerationLimit, match=message):

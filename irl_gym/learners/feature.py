@@ -253,7 +253,7 @@ class FeatureLP:
             n_features=rows.d.shape[1],
             expressible=solved.expressible,
             zero=not alpha.any(),
-            constant=judged.constant,
+            indifferent=judged.indifferent,
             standard_error=error,
         )
 

@@ -69,7 +69,7 @@ class Certificate(Proven):
     least_l1_norm: float
     """No reward with all margins at the cap has a smaller ||R||_1; NaN when that was not asked."""
     constant: bool
-    """Does R have the same value everywhere, and so say nothing?"""
+    """Does R have the same value everywhere? Where episodes end it may prefer much: see `degenerate`."""
     zero: bool
     """Is R zero everywhere?"""
     unconstrained: Indices
@@ -94,11 +94,13 @@ class Certificate(Proven):
     """(v,) by how much each is violated, in units of value."""
     violated_visits: Numbers = field(default_factory=lambda: np.zeros(0))
     """(v,) how often the row's state was visited; NaN when that is not known."""
+    indifferent: bool = False
+    """Is the expert tied, to rounding, in every row of (4)?"""
 
     @property
     def degenerate(self) -> bool:
-        """Is R zero or constant?"""
-        return self.zero or self.constant
+        """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
+        return self.zero or self.indifferent
 
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
@@ -114,7 +116,7 @@ class Certificate(Proven):
             above = max(self.l1_norm - self.least_l1_norm, 0.0)
             lines.append(f"||R||_1                  {self.l1_norm:.6g}, at most {above:.1e} above the least with these margins")
         if self.degenerate:
-            lines.append(f"degenerate               R is {'zero' if self.zero else 'constant'}")
+            lines.append(f"degenerate               {'R is zero' if self.zero else 'R ties the expert with every action'}")
         if self.inseparable.size:
             lines.append(
                 f"same successors          in {self.inseparable.size} states an action that no state reward tells apart"
@@ -231,6 +233,7 @@ def certify(
         least_l1_norm=dual.least_l1_norm(y_l1),
         unconstrained=rows[np.setdiff1d(np.flatnonzero(~part.terminal), comparisons.states[usable])],
         **judged(mdp, part, rows, comparisons, R, values, violations, r_max, unbreakable),
+        indifferent=tied_throughout(values, R, part),
     )
 
 
@@ -274,6 +277,11 @@ def judged(
         "unbreakable_rows": _pairs(comparisons, rows, left_out),
         **violated_rows(violations, rounding, comparisons, rows, visits),
     }
+
+
+def tied_throughout(margins: np.ndarray, R: TabularReward, part: TabularMDP) -> bool:
+    """Is no margin (n,) of (4) other than 0, to rounding, under a reward on the reachable part?"""
+    return bool(np.abs(margins).max(initial=0.0) <= tolerated(R.largest(part), part.gamma))
 
 
 def tolerated(largest: float, gamma: float) -> float:

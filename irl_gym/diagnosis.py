@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from irl_gym.diagnoses import nothing, sampled, solving, ties, truth, unseen, values
+from irl_gym.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.diagnoses.findings import Finding as Finding
@@ -37,6 +37,7 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     nothing.no_reward,
     nothing.zero_reward,
     nothing.constant_reward,
+    weights.flat_weights,
     sampled.inexpressible,
     truth.poor_expert,
     truth.few_episodes,
@@ -105,8 +106,13 @@ def doctor(
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
         shaped,
+        weights=_weights(reward),
     )
     return diagnose(case)
+
+
+def _weights(reward: Any) -> np.ndarray | None:
+    return reward.alpha if isinstance(reward, LinearReward) else None
 
 
 def _tabular(reward: Any, mdp: TabularMDP, states: States | None) -> TabularReward:
@@ -153,7 +159,9 @@ def diagnose_run(run: "Run") -> Diagnosis:
     table, claims = run.table, run.certificate
     if table is None:
         stats = reward.get("stats", {})
-        return diagnose(Case(claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics))
+        return diagnose(
+            Case(claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics, weights=_weights(run.learned))
+        )
     case = Case(
         table.mdp,
         seen_with_noise(run.path, table) if run.config.get("epsilon") else run.expert,
@@ -164,6 +172,7 @@ def diagnose_run(run: "Run") -> Diagnosis:
         table.reward,
         bool(run.config.get("shaping")),
         run.metrics,
+        _weights(run.learned),
     )
     return diagnose(case)
 

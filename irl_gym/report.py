@@ -177,7 +177,7 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
         of_all = f"{reward['unknown_states']:,} of {metrics['table']['reachable']:,}"
         yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"
     if reward["degenerate"]:
-        yield "degenerate", "R is zero or constant, or ties the expert with every policy found"
+        yield "degenerate", "R is zero, or ties the expert with every action, or every policy found"
     if "worst_tie_regret" in reward:
         yield "worst-tie regret", _worst_tie(reward)
     known = [f"{name} {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]

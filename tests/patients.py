@@ -64,4 +64,4 @@ def sampled(**changes):
         "alpha_l1_norm": 2.0, "rank": 2, "n_features": 2, "horizon": 500, "truncation": 0.01, "zero": False,
     }  # fmt: skip
     proof = TrajectoryCertificate(**{**healthy, **changes})
-    return IRLResult(LinearReward(np.ones(2), Table(np.eye(2))), Status.OPTIMAL, 4.0, proof, stats)
+    return IRLResult(LinearReward(np.array([1.0, -0.5]), Table(np.eye(2))), Status.OPTIMAL, 4.0, proof, stats)

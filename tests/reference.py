@@ -84,19 +84,22 @@ def margins(P: np.ndarray, gamma: float, expert: np.ndarray, R: np.ndarray, *, s
     return differences.min(axis=1)
 
 
-def section_4_lp(P, gamma, expert, Phi, S_0, *, penalty: float = 2.0, l1: float = 0.0, cap: float | None = None):
+def section_4_lp(
+    P, gamma, expert, Phi, S_0, *, penalty: float = 2.0, l1: float = 0.0, cap: float | None = None, printed: bool = False
+):
     """Section 4, with the explicit inverse. Unknowns: alpha+ (K), alpha- (K), z (one a state). Returns objective and alpha.
 
     maximise    sum_{s in S_0} z_s - l1 sum(alpha+ + alpha-)
     subject to  z_s <= x and z_s <= penalty x,    x = (P_pi(s) - P_a(s)) sum_i alpha_i V_i, for each a != pi(s)
                 V_i = (I - gamma P_pi)^-1 phi_i,    alpha = alpha+ - alpha-,    0 <= alpha+, alpha- <= 1
-    Rows without a difference in successors are not counted. `Phi` is (S, K). With a cap z_s <= cap too, which is ours.
+    Rows without a difference in successors are not counted, but where `printed`. `Phi` is (S, K).
+    With a cap z_s <= cap too, which is ours.
     """
     S, A, _ = P.shape
     K = Phi.shape[1]
     P_pi = P[np.arange(S), expert]
     V = np.linalg.inv(np.eye(S) - gamma * P_pi) @ Phi
-    rows = [(s, a) for s in S_0 for a in range(A) if a != expert[s] and np.abs(P_pi[s] - P[s, a]).max() > 1e-12]
+    rows = [(s, a) for s in S_0 for a in range(A) if a != expert[s] and (printed or np.abs(P_pi[s] - P[s, a]).max() > 1e-12)]
     counted = sorted({s for s, _ in rows})
     upper = []
     for s, a in rows:

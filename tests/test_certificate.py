@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from irl_gym.certificate import certify
 from irl_gym.comparisons import compare
 from irl_gym.errors import InvalidPolicy, InvalidReward
+from irl_gym.learners.feature import FeatureLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 
@@ -97,6 +98,35 @@ def test_certificate_calls_a_constant_reward_degenerate(shape, value, zero):
     model = models.random_model(0)
     certificate = certify(model.mdp, model.expert, TabularReward(np.full(shape, value)))
     assert (certificate.constant, certificate.zero, certificate.degenerate) == (True, zero, True)
+
+
+def test_certificate_does_not_call_a_price_of_steps_degenerate_where_episodes_end():
+    P = np.zeros((3, 2, 3))
+    P[0, 0, 1] = P[0, 1, 0] = P[1, 0, 2] = P[1, 1, 0] = 1  # 2 is terminal: action 0 is the shortest way
+    mdp = TabularMDP.from_dense(P, 0.9, np.eye(3)[0])
+    certificate = certify(mdp, np.zeros(3, dtype=int), TabularReward(-np.ones(3)))
+    assert certificate.constant and certificate.expert_optimal and certificate.margin[:2].min() > 0.1
+    assert not certificate.degenerate and "degenerate" not in str(certificate)
+    features = FeatureLP(np.ones((3, 1))).fit(mdp, np.zeros(3, dtype=int))
+    assert features.reward.alpha.tolist() == [-1] and not features.certificate.degenerate
+
+
+def test_certificate_calls_a_reward_degenerate_that_ties_all_actions_though_it_is_not_constant():
+    P = np.zeros((4, 2, 4))
+    P[:, 0, :] = np.eye(4)[[1, 3, 3, 0]]
+    P[:, 1, :] = np.eye(4)[[2, 3, 3, 0]]  # 1 and 2 are alike
+    mdp = TabularMDP.from_dense(P, 0.9, np.eye(4)[0])
+    certificate = certify(
+        mdp, np.array([[1.0, 0.0], [0.5, 0.5], [0.5, 0.5], [0.5, 0.5]]), TabularReward(np.array([0.0, 1, 1, 3]))
+    )
+    assert not certificate.constant and certificate.degenerate and "ties the expert with every action" in str(certificate)
+
+
+def test_certificate_does_not_call_a_tie_with_one_action_of_two_degenerate():
+    P = np.zeros((3, 3, 3))
+    P[:, 0, 1] = P[:, 1, 1] = P[:, 2, 2] = 1
+    mdp = TabularMDP.from_dense(P, 0.9, np.eye(3)[0])
+    assert not certify(mdp, np.zeros(3, dtype=int), TabularReward(np.array([0.0, 1.0, 0.0]))).degenerate
 
 
 def test_certificate_does_not_call_the_true_reward_degenerate():

@@ -33,6 +33,8 @@ class Line:
     """The reward it is of."""
     margins: np.ndarray
     """Its margins."""
+    violation: float = 0.0
+    """By how much it violates a constraint, relative to what a margin can be: where this is large it is no point."""
 
     def at(self, price: float) -> float:
         """What it is worth at a price."""
@@ -56,7 +58,9 @@ class Envelope:
     gap: float
     """The largest distance between the lines and the bounds above f, at any price."""
     exact: bool
-    """Was each crossing followed?"""
+    """Was each crossing followed? What that proves, `gap` and `violation` say."""
+    violation: float
+    """The largest of the lines."""
     solves: int
     """How often the optimiser was asked."""
 
@@ -80,7 +84,8 @@ def envelope(solve: Solve, most: int | None = None, nothing: float = 0.0) -> Env
     prices, bounds = np.array(search.prices), np.array(search.bounds)
     gaps = np.maximum(np.interp(breakpoints, prices, bounds) - lower, 0.0)
     between = bounds - np.interp(prices, breakpoints, lower)
-    return Envelope(tuple(kept), breakpoints, gaps, float(max(gaps.max(), between.max())), exact, len(prices))
+    gap, violation = float(max(gaps.max(), between.max())), max(line.violation for line in kept)
+    return Envelope(tuple(kept), breakpoints, gaps, gap, exact, violation, len(prices))
 
 
 class _Search:

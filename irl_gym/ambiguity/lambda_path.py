@@ -1,4 +1,4 @@
-"""The path of FiniteLP's reward as lambda, the price of ||R||_1, rises from 0 to lambda_0: every breakpoint, exactly.
+"""The path of FiniteLP's reward as lambda, the price of ||R||_1, rises from 0 to lambda_0: every breakpoint, with a proof.
 
     f(lambda) = max sum_s t(s) - lambda ||R||_1    subject to (4), |R| <= R_max   (Ng & Russell 2000, section 3.2)
 Ng and Russell search by hand for the lambda just below lambda_0, where R is simple. But f is a maximum of finitely many lines,
@@ -33,6 +33,9 @@ from irl_gym.rewards import TabularReward, read_archive, write_archive
 FORMAT = "irl_gym.LambdaPath/1"
 ARRAYS = ("breakpoints", "rewards", "margins", "l1_norms", "total_margins", "gaps")
 NUMBERS = ("gap", "exact", "r_max", "margin_cap", "solves")
+CERTIFIED = 1e-6
+"""Certified: no gap is larger, relative to the total margin at price 0, and no violation of (4), relative to R_max
+or the cap, the smaller."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +59,26 @@ class LambdaPath:
     gaps: np.ndarray
     """(k+1,) by how much f can be above the path at each breakpoint: Lagrange's bound there, minus the objective."""
     gap: float
-    """The largest such distance at any lambda: where `exact`, rounding; otherwise what the pieces left out can be worth."""
-    exact: bool
-    """Are these all pieces? False where `most_pieces` stopped the search: the pieces are then optimal somewhere, but others
-    may lie between them, and the breakpoints are where the known pieces cross."""
+    """The largest such distance at any lambda: what the path can fall short of the optimum, whatever the solver did."""
+    whole: bool
+    """Was each crossing followed? False where `most_pieces` stopped the search: other pieces may lie between these, and the
+    breakpoints are where the known pieces cross. Says nothing of what the solver missed: `exact` does."""
     r_max: float
     """R_max, the bound on |R|."""
     margin_cap: float | None
     """The cap on margins; None in Ng & Russell's own program."""
     solves: int = 0
     """Linear programs solved."""
+    violation: float = 0.0
+    """The largest violation of (4) by a piece, recomputed from P, relative to R_max or the cap, the smaller."""
 
     FORMATS: ClassVar[tuple[str, ...]] = (FORMAT,)
+
+    @property
+    def exact(self) -> bool:
+        """Is it certified that these are all pieces? Each crossing was followed, and no gap or violation is above CERTIFIED."""
+        proved = self.gap <= CERTIFIED * self.total_margins[0] and self.violation <= CERTIFIED
+        return bool(self.whole and proved)  # a NaN proves nothing
 
     @property
     def lambda_0(self) -> float:
@@ -119,10 +130,11 @@ class LambdaPath:
 
     def __str__(self) -> str:
         """The path in three lines."""
-        kind = "all" if self.exact else "some of its"
+        kind = "all" if self.exact else "some of its" if not self.whole else "not certified:"
+        off = "" if self.violation <= CERTIFIED else f", and violates (4) by {self.violation:.1e} of what a margin can be"
         return (
             f"lambda path     {kind} {self.n_pieces} pieces from 0 to lambda_0 = {self.lambda_0:.6g}, at most {self.gap:.1e} "
-            f"below the optimum\n||R||_1         {self.l1_norms[0]:.6g} to {self.l1_norms[-1]:.6g}\ntotal margin    "
+            f"below the optimum{off}\n||R||_1         {self.l1_norms[0]:.6g} to {self.l1_norms[-1]:.6g}\ntotal margin    "
             f"{self.total_margins[0]:.6g} to {self.total_margins[-1]:.6g}"
         )
 
@@ -132,7 +144,7 @@ class LambdaPath:
         return arrays | self._header() | {"lambda_0": self.lambda_0, "changes": [one.to_json() for one in self.changes]}
 
     def _header(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in NUMBERS}
+        return {name: getattr(self, name) for name in (*NUMBERS, "whole", "violation")}
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle. Beside first, then renamed."""
@@ -150,7 +162,9 @@ class LambdaPath:
         missing = [name for name in NUMBERS if name not in header] + [name for name in ARRAYS if name not in arrays]
         if missing:
             raise InvalidReward(f"{path} has no {missing[0]}: expected a file written by LambdaPath.save.")
-        return cls(**{name: arrays[name] for name in ARRAYS}, **{name: header[name] for name in NUMBERS})
+        numbers = {name: header[name] for name in NUMBERS if name != "exact"}  # a property; before it was the search's own word
+        numbers |= {"whole": header.get("whole", header["exact"]), "violation": header.get("violation", 0.0)}
+        return cls(**{name: arrays[name] for name in ARRAYS}, **numbers)
 
 
 def lambda_path(
@@ -201,7 +215,8 @@ def lambda_path(
         total_margins=np.array([line.total for line in found.lines]),
         gaps=found.gaps,
         gap=found.gap,
-        exact=found.exact,
+        whole=found.exact,
+        violation=found.violation,
         r_max=float(r_max),
         margin_cap=None if cap is None else float(cap),
         solves=found.solves,

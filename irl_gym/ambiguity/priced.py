@@ -90,12 +90,12 @@ class PricedProgram:
 
     def _answer(self, vertex: Vertex, price: float) -> tuple[Line, float, float]:
         """The reward of a vertex, the bound of its duals, and how far from an optimum of the program these are."""
-        line, violation = self.line(self.program.rewards(vertex.x))
+        line = self.line(self.program.rewards(vertex.x))
         y = np.zeros(self.comparisons.states.size)
         y[self.program.kept] = vertex.row_duals[self.part.n_states :] / PRICED
         bound = self.bound(y, price)
         missing = (bound - line.at(price)) / max(self.largest, line.total, 1e-300)
-        return line, bound, max(missing, violation / (self.unit * LARGE))
+        return line, bound, max(missing, line.violation)
 
     def _solved(self, cost: np.ndarray) -> Vertex:
         """The optimum, from where the last solve ended; from scratch where that leads nowhere."""
@@ -125,7 +125,7 @@ class PricedProgram:
     def _late(self) -> SolverTimeout:
         return SolverTimeout(f"the path was not finished in {self.time_limit} s: raise time_limit, or give most_pieces.")
 
-    def line(self, R: np.ndarray) -> tuple[Line, float]:
+    def line(self, R: np.ndarray) -> Line:
         """What a reward (q,), in the program's unit, is worth, and its largest violation of (4): from P and the expert."""
         bound, part, c = self.r_max / self.unit, self.part, self.comparisons
         R = np.clip(R, -bound, bound)
@@ -139,7 +139,7 @@ class PricedProgram:
         whole, margins = np.zeros((S, *R.shape[1:])), np.full(S, np.nan)
         whole[self.rows], margins[self.rows] = R, least
         violation = float(np.where(c.equal, np.abs(values), -values).max(initial=0.0))
-        return Line(total, float(np.abs(R).sum()), whole, margins), violation
+        return Line(total, float(np.abs(R).sum()), whole, margins, violation / (self.unit * LARGE))
 
     def bound(self, y: np.ndarray, price: float) -> float:
         """No reward is worth more at this price; valid for any duals y (n,) of the rows of (4)."""

@@ -74,6 +74,8 @@ class Case:
     """Is the agent retrained on the expected advantage?"""
     judged: Mapping[str, Any] = field(default_factory=dict)
     """The content of a run's metrics.json; empty where nothing was judged."""
+    weights: np.ndarray | None = None
+    """(K,) alpha of a reward that is linear in features; None for another."""
 
     @cached_property
     def on_states(self) -> bool:

@@ -38,7 +38,7 @@ def left_behind(path: Path) -> Case | None:
         return None
     return Case(
         table.mdp, expert, reward, claims, record.get("status", ""), record.get("stats", {}), table.reward,
-        bool(config.get("shaping")),
+        bool(config.get("shaping")), weights=learned.alpha if isinstance(learned, LinearReward) else None,
     )  # fmt: skip
 
 

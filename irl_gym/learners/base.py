@@ -28,7 +28,7 @@ class Proof(Protocol):
 
     @property
     def degenerate(self) -> bool:
-        """Does the reward say nothing?"""
+        """Does the reward say nothing: is the expert tied with everything?"""
         ...
 
     def to_json(self) -> dict[str, Any]:

@@ -4,7 +4,10 @@ R = sum_i alpha_i phi_i (8), so V = sum_i alpha_i V_i (9), V_i the value of the 
     maximise    sum_{s in S_0} min_{a != pi(s)} p(E_{s' ~ P_s,pi(s)} V(s') - E_{s' ~ P_sa} V(s')) - l1 ||alpha||_1
     subject to  |alpha_i| <= 1,    p(x) = x for x >= 0, and 2 x below
 The features may express no reward that makes the expert optimal, so (10) is not a constraint: what violates it counts twice.
-States without another action of other successors are not counted.
+
+Departs: an action with the expert's successors has no row, and a state without another action is not counted. As printed such a
+row says 0, so that its state's min is at most 0 whatever the reward, and the optimum is another one;
+`trivial_rows="as printed"` keeps these rows, and is the program as printed.
 
 `margin_cap=tau` Departs: each margin counts up to tau only. The paper's sum buys one state's margin at the price of others',
 and pays for violations with large margins elsewhere, also where the features express a reward that makes the expert optimal.
@@ -74,12 +77,16 @@ class FeatureLP:
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
     """Seconds for each program; None for no limit."""
+    trivial_rows: Literal["left out", "as printed"] = "left out"
+    """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
         check_weighing(self)
         if self.margin_cap is not None and self.margin_cap != "auto":
             checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
+        if self.trivial_rows not in ("left out", "as printed"):
+            raise InvalidParameter(f"trivial_rows is {self.trivial_rows!r}: expected 'left out' or 'as printed'.")
         checked_number("samples", self.samples, "a whole number of at least 1", least=1, whole=True)
         if isinstance(self.S_0, int | float | str | np.number):
             checked_number("S_0", self.S_0, "a number of at least 1, states, or None for all", least=1, whole=True)
@@ -135,7 +142,7 @@ class FeatureLP:
         expert, known = completed(expert, mdp.n_states)
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
-        found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted)
+        found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted, printed=self.trivial_rows == "as printed")
         solved = self._solve(found)
         weights = solved.weights
         reward = self._reward(weights)
@@ -151,7 +158,16 @@ class FeatureLP:
             )
         S_0 = self._states_of(model)
         horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)
-        found = rows_of_model(model, expert, self.phi, S_0, samples=int(self.samples), horizon=horizon, seed=int(self.seed))
+        found = rows_of_model(
+            model,
+            expert,
+            self.phi,
+            S_0,
+            samples=int(self.samples),
+            horizon=horizon,
+            seed=int(self.seed),
+            printed=self.trivial_rows == "as printed",
+        )
         solved = self._solve(found)
         weights = solved.weights
         margin, tolerance, error = np.full(len(S_0), np.nan), np.full(len(S_0), 1e-9 * found.rows.scale), None
@@ -253,7 +269,7 @@ class FeatureLP:
             n_features=rows.d.shape[1],
             expressible=solved.expressible,
             zero=not alpha.any(),
-            constant=judged.constant,
+            indifferent=judged.indifferent,
             standard_error=error,
         )
 

@@ -53,15 +53,15 @@ class FeatureCertificate(Proven):
     """Does some reward in the span of the features satisfy (10) in all of S_0, other than one that ties everything?"""
     zero: bool
     """Is alpha zero?"""
-    constant: bool
-    """Is R the same in every state judged?"""
+    indifferent: bool
+    """Is the expert tied, to rounding, with every action in every state judged?"""
     standard_error: float | None
     """The largest standard error of a row of (10) under R; None where the rows are exact or had one rollout."""
 
     @property
     def degenerate(self) -> bool:
-        """Is R zero or constant?"""
-        return self.zero or self.constant
+        """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
+        return self.zero or self.indifferent
 
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
@@ -77,7 +77,7 @@ class FeatureCertificate(Proven):
         if not self.expressible:
             lines.append("expressible              no reward in the span of the features makes the expert optimal")
         if self.degenerate:
-            lines.append(f"degenerate               R is {'zero' if self.zero else 'constant'}")
+            lines.append(f"degenerate               {'R is zero' if self.zero else 'R ties the expert with every action'}")
         if self.standard_error is not None:
             lines.append(f"standard error           {self.standard_error:.2e} at most, of a row under R")
         return "\n".join(lines)
@@ -93,8 +93,8 @@ class Judged:
     """The largest difference between actions that the expert takes in a state; 0 where it takes one."""
     tolerance: float | np.ndarray
     """A violation below this is none; one number, or one for each state."""
-    constant: bool
-    """Is R the same everywhere?"""
+    indifferent: bool
+    """Is the expert tied with every action in every state judged?"""
 
 
 def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, discounted: Discounted) -> Judged:
@@ -110,5 +110,4 @@ def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, 
     tolerance = OPTIMAL_WITHIN * scale * (1 + 0.1 / (1 - mdp.gamma))
     margin[~judged | ~np.isfinite(margin)] = np.nan
     tied = np.where(judged, np.where(taken, np.abs(advantage), 0.0).max(axis=1), 0.0)
-    seen = R[mdp.reachable]
-    return Judged(margin, tied, tolerance, bool(np.ptp(seen) <= 1e-9 * max(scale, 1e-300)))
+    return Judged(margin, tied, tolerance, bool(np.abs(advantage[judged]).max(initial=0.0) <= tolerance))

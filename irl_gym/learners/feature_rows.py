@@ -108,6 +108,8 @@ def rows_of_table(
     decode: Callable[[np.ndarray], Any],
     S_0: np.ndarray,
     discounted: Discounted,
+    *,
+    printed: bool = False,
 ) -> FeatureRows:
     """The rows of a table, exactly.
 
@@ -119,6 +121,7 @@ def rows_of_table(
         decode: turns rows of the table into what the features are of.
         S_0: (m,) increasing states.
         discounted: I - gamma P_pi.
+        printed: keep the rows that are 0 whatever the reward, as the paper's program does.
 
     Raises:
         DegenerateExpert: no row that a reward on states can move.
@@ -131,6 +134,7 @@ def rows_of_table(
             f"none of the {S_0.size} states of S_0 compares the expert with an action of other successors: every reward on "
             "states makes it optimal there. Choose a larger S_0."
         )
+    kept = kept | (printed & ~comparisons.equal)
     d = np.empty((int(kept.sum()), features.n_features))
     differences = comparisons.rows[kept]
     width = max(1, BLOCK // mdp.n_states)
@@ -139,6 +143,7 @@ def rows_of_table(
         columns = slice(begin, min(begin + width, features.n_features))
         V = discounted.solve(over_rows(features, decode, everything, columns))
         d[:, columns] = differences @ V
+    d[comparisons.trivial[kept]] = 0.0
     return _grouped(comparisons, kept, d, S_0)
 
 
@@ -156,7 +161,15 @@ def _grouped(comparisons: Comparisons, kept: np.ndarray, d: np.ndarray, S_0: np.
 
 
 def rows_of_model(
-    model: GenerativeModel, expert: Policy, features: FeatureMap, S_0: np.ndarray, *, samples: int, horizon: int, seed: int
+    model: GenerativeModel,
+    expert: Policy,
+    features: FeatureMap,
+    S_0: np.ndarray,
+    *,
+    samples: int,
+    horizon: int,
+    seed: int,
+    printed: bool = False,
 ) -> FeatureRows:
     """The rows of a world that can only be set to a state and run, by Monte Carlo.
 
@@ -170,6 +183,7 @@ def rows_of_model(
         samples: rollouts for each state and action.
         horizon: steps after which a rollout is cut.
         seed: of the random numbers.
+        printed: keep the rows that are 0 in every rollout, as the paper's program does.
 
     Raises:
         DegenerateExpert: no action leads the expert's states elsewhere.
@@ -194,6 +208,7 @@ def rows_of_model(
             f"no other action leads from the {len(S_0)} states of S_0 to other features than the expert's: nothing can be "
             "learned from them. Choose a larger S_0 or other features."
         )
+    moved = moved | printed
     named, groups = np.unique(s[moved], return_inverse=True)
     d = np.average(batches[:, moved], axis=0, weights=sizes)
     return FeatureRows(Rows(d, groups), named, len(S_0) - named.size, batches[:, moved] if parts > 1 else None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irl_gym._typing import Vector
-from irl_gym.certificate import Certificate, comparable, judged, least_per_state
+from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout
 from irl_gym.dynamic_programming import backup, policy_iteration
 from irl_gym.learners.soft import PartlyKnown
 from irl_gym.mdp import TabularMDP
@@ -124,4 +124,5 @@ def certify_partly(
         slack=None if terms.slack is None else float(terms.slack),
         unknown=rows[partly.unknown],
         **judged(mdp, part, rows, c, R, found.margins, short, terms.r_max, terms.unbreakable, visits),
+        indifferent=tied_throughout(found.margins[partly.active], R, part),
     )

@@ -101,7 +101,7 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     yield "Expert optimal under the reward", "yes" if reward["expert_optimal"] else _why_not(reward)
     if held.get("degenerate"):
-        yield "Degenerate", "yes: the reward is zero or constant, or ties the expert with every policy found"
+        yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)
     finite = margin[np.isfinite(margin)]
     if finite.size:

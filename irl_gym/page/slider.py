@@ -126,7 +126,12 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
     if not path.get("exact", True):
         more = number(float(path["gap"]), 2)
-        thinned += f" There are more pieces than were worked out: between these the objective can be {more} larger."
+        stopped = not path.get("whole", path["exact"])
+        thinned += (
+            f" There are more pieces than were worked out: between these the objective can be {more} larger."
+            if stopped
+            else f" The path is not certified: the optimum can be {more} above it, and pieces may lack."
+        )
     lead = (
         "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "
         f"lambda_0 = {number(pieces.low[-1])} on it is 0. Move the slider to walk through the pieces.{thinned}"

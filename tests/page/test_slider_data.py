@@ -53,6 +53,12 @@ def test_a_path_that_is_not_whole_says_how_much_may_be_missing(scene, exact):
     assert ("There are more pieces" in lead and "0.013 larger" in lead) != exact
 
 
+def test_a_path_that_is_not_certified_says_by_how_much(scene):
+    path = {**scene.run.lambda_path, "exact": np.array(False), "whole": np.array(True), "gap": np.array(0.3)}
+    lead = lambda_slider(replace(scene, run=replace(scene.run, lambda_path=path)))[0].lead
+    assert "not certified" in lead and "0.3 above it" in lead and "There are more pieces" not in lead
+
+
 def with_path(scene, **changes):
     return replace(scene, run=replace(scene.run, lambda_path={**scene.run.lambda_path, **changes}))
 

@@ -2,7 +2,7 @@
 
     environment_steps   made so far
     true_value          discounted, from the start: exact on a table, the mean of a few episodes elsewhere
-    mean_return         undiscounted, of sampled episodes, with a bootstrapped 95 % interval
+    mean_return         undiscounted, of sampled episodes, with a 95 % interval (`intervals`)
 Axes: n points.
 """
 
@@ -36,14 +36,15 @@ class Curve:
     mean: np.ndarray
     """(n,) mean undiscounted true return; NaN in runs of earlier versions, as are the next two."""
     low: np.ndarray
-    """(n,) lower end of its 95 % interval."""
+    """(n,) lower end of its 95 % interval; NaN where that is unknown, too."""
     high: np.ndarray
     """(n,) upper end."""
 
 
 def write_curve(curve: Curve, path: Path) -> None:
-    """Write a curve as csv."""
-    points = zip(curve.steps.tolist(), *(one.tolist() for one in (curve.value, curve.mean, curve.low, curve.high)), strict=True)
+    """Write a curve as csv; what is not known is left empty."""
+    numbers = (curve.value, curve.mean, curve.low, curve.high)
+    points = zip(curve.steps.tolist(), *(["" if np.isnan(x) else x for x in one.tolist()] for one in numbers), strict=True)
     with path.open("w", newline="") as file:
         csv.writer(file).writerows([COLUMNS, *((int(steps), *rest) for steps, *rest in points)])
 
@@ -58,17 +59,39 @@ def read_curve(path: Path) -> Curve:
         heading, *lines = csv.reader(file)
     if tuple(heading) not in (COLUMNS, COLUMNS[:2]):
         raise ValueError(f"its columns are {heading}: expected {list(COLUMNS)}")
-    numbers = np.array(lines, dtype=np.float64).reshape(-1, len(heading))
+    numbers = np.array([[one or "nan" for one in line] for line in lines], dtype=np.float64).reshape(-1, len(heading))
     padded = np.full((len(numbers), len(COLUMNS)), np.nan)
     padded[:, : len(heading)] = numbers
     return Curve(*padded.T)
 
 
-def curve_of(steps: Sequence[int], value: Sequence[float], returns: Sequence[np.ndarray], seed: int) -> Curve:
-    """The curve of points, each with the returns of its episodes."""
-    rng = np.random.default_rng(seed)
-    found = np.array([mean_interval(one, rng=rng) for one in returns]).reshape(-1, 3)
+def curve_of(
+    steps: Sequence[int],
+    value: Sequence[float],
+    returns: Sequence[np.ndarray],
+    possible: tuple[float, float] | None = None,
+) -> Curve:
+    """The curve of points, each with the returns of its episodes; the two returns that are possible may be given."""
+    found = np.array([mean_interval(one, possible=possible) for one in returns]).reshape(-1, 3)
     return Curve(np.array(steps, dtype=np.float64), np.array(value, dtype=np.float64), *found.T)
+
+
+def two_returns(table: Tabulation) -> tuple[float, float] | None:
+    """The only two undiscounted returns that episodes can have; None where that is not certain.
+
+    It is where the table is exact, and every step pays 0 or one and the same reward, which ends the episode: an episode that is
+    cut before, or ends without it, returns 0.
+    """
+    paid = table.payments.entries
+    if not table.evidence.exact or paid is None:
+        return None
+    pays = np.flatnonzero(paid)
+    if not pays.size or not table.mdp.terminal[table.mdp.P.indices[pays]].all():
+        return None
+    low, high = float(paid[pays].min()), float(paid[pays].max())
+    if high - low > 1e-9 * max(abs(low), abs(high)):
+        return None
+    return (min(low, 0.0), max(high, 0.0))
 
 
 def sampled_returns(

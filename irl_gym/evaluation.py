@@ -9,7 +9,7 @@ import numpy as np
 
 from irl_gym import metrics
 from irl_gym._typing import ActionSets, Matrix
-from irl_gym.curves import Curve, read_curve
+from irl_gym.curves import Curve, read_curve, two_returns
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular, UndefinedDistance
@@ -40,13 +40,15 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         told = name == "expert" and from_data(loop)
         episodes = [] if told else world.episodes(policy, experiment.eval_episodes, experiment.seed + JUDGING)
         returns = earned[:, 1] if told else np.array([episode.total_reward for episode in episodes])
-        mean, low, high = mean_interval(returns, rng=np.random.default_rng(experiment.seed))
+        possible = two_returns(world.table) if isinstance(world, TableWorld) and not told else None
+        mean = mean_interval(returns, possible=possible)
+        low, high = mean.ends
         value = {"expert": scale.expert, "random": scale.random}.get(name)
         value = world.value(policy) if value is None else value
         rows[name] = {
             "value": value,
             "score": scale.score(value),
-            "mean_return": mean,
+            "mean_return": mean.estimate,
             "return_low": low,
             "return_high": high,
             "agreement": metrics.agreement(world.table.mdp, policy, agreed)

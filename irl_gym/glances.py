@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from irl_gym.curves import EPISODES, Curve, curve_of, sampled_returns
+from irl_gym.curves import EPISODES, Curve, curve_of, sampled_returns, two_returns
 from irl_gym.planners import tabular_actions
 from irl_gym.policies import Policy
 from irl_gym.worlds import GLANCE, SteppedWorld, TableWorld, discounted_mean, step_limit
@@ -44,8 +44,8 @@ class Glances:
 
     def curve(self) -> Curve:
         """All points; on a table with the returns of sampled episodes."""
-        world, returns = self.world, self._returns
+        world, returns, possible = self.world, self._returns, None
         if isinstance(world, TableWorld):
-            limit = step_limit(world.env)
+            limit, possible = step_limit(world.env), two_returns(world.table)
             returns = sampled_returns(world.table, self._actions, EPISODES, limit=limit, seed=world.seed + 7_919)
-        return curve_of(self._steps, self._values, returns, world.seed)
+        return curve_of(self._steps, self._values, returns, possible)

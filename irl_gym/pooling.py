@@ -1,8 +1,8 @@
-"""Runs that differ in nothing but their seed, taken together: interquartile means with bootstrapped 95 % intervals.
+"""Runs that differ in nothing but their seed, taken together: interquartile means with 95 % intervals.
 
 A single seed says little of a method (Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the Statistical
 Precipice"). Runs with the same configuration are one pool, with one run a seed. Pools that differ in their environment alone
-are taken together once more, by their scores: the draws are stratified, seeds within each environment.
+are taken together once more, by their scores: what varies is the seeds within each environment.
 Axes: T pools, n seeds, p points of a learning curve.
 """
 
@@ -63,8 +63,8 @@ class Pool:
 
 
 def over_seeds(values: np.ndarray) -> Interval:
-    """The interquartile mean of (n,) or (T, n) values with its interval; the same values have the same one."""
-    return iqm_interval(values, rng=np.random.default_rng(0))
+    """The interquartile mean of (n,) or (T, n) values with its interval."""
+    return iqm_interval(values)
 
 
 def pools(named: Mapping[str, Run]) -> list[Pool]:
@@ -84,7 +84,7 @@ def pools(named: Mapping[str, Run]) -> list[Pool]:
 
 
 def over_environments(found: Sequence[Pool]) -> list[tuple[list[Pool], Interval]]:
-    """Pools that differ in their environment alone and have equally many seeds, with the stratified mean of their scores."""
+    """Pools that differ in their environment alone and have equally many seeds, with the mean of their scores."""
     scored = [(pool, scores) for pool in found if (scores := pool.scores) is not None]
     groups = _alike([_placeless(pool.first.config) | {"n": scores.size} for pool, scores in scored])
     return [

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
+from irl_gym.intervals import as_interval
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
@@ -83,7 +84,7 @@ def _policies(report: Report) -> Table:
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
         score = "-" if row["score"] is None else f"{row['score']:.3f}"
-        interval = "{:.3f} ({:.3f} to {:.3f})".format(*(row[key] for key in ("mean_return", "return_low", "return_high")))
+        interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
         whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
         table.add_row(whose, f"{row['value']:.4f}", score, interval, *agreement)

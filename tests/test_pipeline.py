@@ -71,7 +71,7 @@ def test_the_expert_agrees_with_its_own_set(report):
 
 def test_mean_returns_lie_in_their_intervals(report):
     for row in report.metrics["policies"].values():
-        assert row["return_low"] <= row["mean_return"] <= row["return_high"]
+        assert row["return_low"] is not None and row["return_low"] <= row["mean_return"] <= row["return_high"]
 
 
 def test_the_agent_saved_is_the_agent_judged(report):

@@ -7,7 +7,7 @@ from irl_gym.page.panels import Panel
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
 from irl_gym.page.worlds import levels_of, levels_told
-from irl_gym.page.written import number, percent, score_of
+from irl_gym.page.written import number, percent, score_of, with_ends
 from irl_gym.pooling import Pool, over_environments
 
 TRIMMED = 4
@@ -25,11 +25,11 @@ def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) 
     if not found:
         return None
     lead = (
-        "Runs that differ in their seed alone, taken together: interquartile means with bootstrapped 95 % intervals, which "
-        "resist outliers (Agarwal et al. 2021)."
+        "Runs that differ in their seed alone, taken together: interquartile means with 95 % intervals, which "
+        "resist outliers (Agarwal et al. 2021). Seeds that agree are too few to say how surely, and have no interval."
     )
     if min(len(pool.runs) for pool in found) < TRIMMED:
-        lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few says little."
+        lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few is wide."
     columns = [_column(pool, places) for pool in found]
     rows = [[key, *(column[key] for column in columns)] for key in columns[0]]
     shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
@@ -58,7 +58,7 @@ def averaged(pool: Pool) -> str:
 
 def spoken(score: Interval | None) -> str:
     """A score with its interval."""
-    return "none" if score is None else f"{score_of(score.estimate)} ({score_of(score.low)} to {score_of(score.high)})"
+    return "none" if score is None else with_ends(score, score_of)
 
 
 def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
@@ -72,18 +72,14 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
         "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
         "score of the retrained agents (95 %)": spoken(pool.score),
         "the worst and the best seed": "none" if scores is None else f"{score_of(scores.min())} and {score_of(scores.max())}",
-        "mean return of the retrained agents (95 %)": _interval(pool.mean_return),
+        "mean return of the retrained agents (95 %)": with_ends(pool.mean_return),
         "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
     }
 
 
-def _interval(found: Interval) -> str:
-    return f"{number(found.estimate)} ({number(found.low)} to {number(found.high)})"
-
-
 def _together(several: Sequence[Pool], score: Interval) -> str:
     letters = "; ".join(map(called, several))
-    return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, with the draws stratified."
+    return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, by what varies within each."
 
 
 def _curves(drawn: Sequence[Pool]) -> Panel:

@@ -117,7 +117,7 @@ def curves(
     for i, (name, (steps, values, band)) in enumerate(series.items()):
         colour, dash, marker = stroke(i)
         if band is not None:
-            x, y = np.concatenate([steps, steps[::-1]]), np.concatenate([band[1], band[0][::-1]])
+            x, y = _outline(steps, *band)
             figure.add_scatter(
                 x=listed(x, 9), y=listed(y), mode="lines", fill="toself", fillcolor=f"var(--{colour})", opacity=0.22,
                 line={"width": 0}, hoverinfo="skip", name="95 % interval",
@@ -134,6 +134,16 @@ def curves(
                 line={"color": f"var(--{level.colour})", "dash": level.dash, "width": 2},
             )  # fmt: skip
     return figure
+
+
+def _outline(steps: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A closed line around each run of points whose interval is known, with NaN in between."""
+    known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
+    x, y = [], []
+    for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        x += [*steps[part], *steps[part][::-1], np.nan]
+        y += [*high[part], *low[part][::-1], np.nan]
+    return np.array(x[:-1]), np.array(y[:-1])
 
 
 def widths(scene: Scene) -> Section:

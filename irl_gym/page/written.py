@@ -1,10 +1,12 @@
 """How the page writes numbers: few digits, thousands apart, and a word where there is none."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+
+from irl_gym.intervals import TOO_FEW, Interval, as_interval
 
 MISSING = "not known"
 ROUNDING = 1e-9
@@ -63,7 +65,12 @@ def percent(share: Any) -> str:
 
 def interval(row: Mapping[str, Any]) -> str:
     """A mean return with its 95 % interval."""
-    return f"{number(row['mean_return'])} ({number(row['return_low'])} to {number(row['return_high'])})"
+    return with_ends(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
+
+
+def with_ends(found: Interval, how: Callable[[Any], str] = number) -> str:
+    """An estimate with its interval, or that there are too few values to say."""
+    return f"{how(found.estimate)} " + (f"({how(found.low)} to {how(found.high)})" if found.known else f"({TOO_FEW})")
 
 
 def seconds(value: Any) -> str:

@@ -37,6 +37,7 @@ def test_seconds_are_read_at_a_glance(value, text):
 
 def test_interval_has_both_ends():
     assert interval({"mean_return": 0.5, "return_low": 0.4, "return_high": 0.6}) == "0.5 (0.4 to 0.6)"
+    assert interval({"mean_return": 0.0, "return_low": None, "return_high": None}) == "0 (too few to say)"
 
 
 def test_listed_makes_nan_none_and_shortens():

@@ -15,32 +15,12 @@ from irl_gym.comparisons import Comparisons, compare
 from irl_gym.dual_bound import DualBound
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
+from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
 
 OPTIMAL_WITHIN = 1e-8
 """What solvers' feasibility leaves of (4). A violation below this, times max |R| and a tenth of 1 / (1 - gamma), is none; nor
 is such a margin one."""
-
-
-class Proven:
-    """What every certificate says of the program's optimum."""
-
-    objective: float
-    dual_bound: float
-
-    @property
-    def duality_gap(self) -> float:
-        """dual_bound - objective: how far the reward can be from the optimum."""
-        return self.dual_bound - self.objective
-
-    @property
-    def optimality(self) -> str:
-        """The same in a line that a person reads."""
-        return f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum"
-
-    def to_json(self) -> dict[str, Any]:
-        """The certificate as json holds it: NaN becomes None."""
-        return plain(self, "duality_gap", "degenerate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,18 +112,6 @@ class Certificate(Proven):
         if self.unknown.size:
             lines.append(f"unknown                  nothing is known of the expert in {self.unknown.size} reachable states")
         return "\n".join(lines)
-
-
-def plain(certificate: Any, *properties: str) -> dict[str, Any]:
-    """The fields of a certificate, and some of its properties, as json holds them: NaN becomes None."""
-    found: dict[str, Any] = {}
-    for name in (*certificate.__dataclass_fields__, *properties):
-        value = getattr(certificate, name)
-        if isinstance(value, np.ndarray):
-            found[name] = [None if v != v else v for v in value.tolist()]
-        else:
-            found[name] = None if value != value else value
-    return found
 
 
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:

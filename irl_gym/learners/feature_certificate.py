@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
-from irl_gym.certificate import OPTIMAL_WITHIN, Proven
+from irl_gym.certificate import OPTIMAL_WITHIN
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
+from irl_gym.proven import Proven
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.certificate import Proven, plain
+from irl_gym.proven import Proven, plain
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ three normal values 75 times in 100; intervals here are
 
 Values that are all equal, or one value, do not say what else could have been: their interval is unknown, with ends NaN, told as
 "too few to say". Of values that are two numbers only, t is widened to hold what Clopper and Pearson say. Coverage, in
-`tests/test_intervals.py`: 95 in 100 of three or five normal values and of 200 lognormal ones (sigma 0.5), 99 and 97 of 20 and
+`tests/test_intervals.py`: 95 in 100 of three or five normal values and of 200 lognormal ones (sigma 0.5), 99 and 96 of 20 and
 200 Bernoulli(0.02) with both returns given. Strongly skewed returns need more: of 20 exponential ones it is 92.
 Axes: N values, T tasks, n seeds.
 """

@@ -8,6 +8,7 @@ With l1 = 0 the reward is the limit l1 -> 0+: the least N with the margins of th
 as low as these margins allow. Axes: S states, A actions, n rows of (4).
 """
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,8 +32,9 @@ GIVEN_UP_BELOW = 1e3
 """Margins down to R_max over this count when the rows are chosen that are given up."""
 GIVEN_UP = 1e-6
 """A violation above this, in units of those margins, gives a state's rows up."""
-LEEWAY = 1e-8
-"""What the simplest reward may leave of the best one's margins, in their unit: without it no interior is left."""
+LEEWAYS = (1e-8, 1e-7, 1e-6)
+"""What the simplest reward may leave of the best one's margins, in their unit: without it no interior is left. The next where
+the solver finds none. The certificate's gap includes it."""
 
 
 class PartialTask:
@@ -103,15 +105,22 @@ class PartialTask:
             unit = r_max if cap is None else cap
             if need is None:
                 best = self.recorded("margins", self.program(soft=True).best(r_max / unit, None if cap is None else 1.0, 0.0))
-                bound, need = best.bound * unit, self._needed(best, cap)
+                bound, needs = best.bound * unit, [self._needed(best, cap, leeway) for leeway in LEEWAYS]
             else:
                 counted = np.unique(self.partly.comparisons.states[self.counted])
-                bound = float(unit * self.partly.weights[counted].sum())
-            soft = learner.slack is not None and bool((need < 0).any())
-            found = self.recorded("reward", self.program(soft=soft).simplest(r_max / unit, need))
+                bound, needs = float(unit * self.partly.weights[counted].sum()), [need]
+            found = self.recorded("reward", self._simplest(r_max / unit, needs))
             self.stats["price"] = -found.objective * unit
             self.stats["least_price"] = -found.bound * unit
         return self._result(found, unit, bound, Terms(r_max, l1, cap, learner.slack, self.counted, self.unbreakable), lambda_0)
+
+    def _simplest(self, bound: float, needs: list[np.ndarray]) -> Found:
+        """The simplest reward with what the rows need: the first of `needs` (n,) that the solver can meet."""
+        for need in needs[:-1]:
+            with suppress(SolverInfeasible):
+                return self._simplest(bound, [need])
+        soft = self.learner.slack is not None and bool((needs[-1] < 0).any())
+        return self.program(soft=soft).simplest(bound, needs[-1])
 
     def recorded(self, name: str, found: Found) -> Found:
         """Note what the solver did."""
@@ -199,7 +208,7 @@ class PartialTask:
         stacked = c.states * mdp.n_actions + c.actions
         return found.V[c.states] - found.R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ found.V)
 
-    def _needed(self, best: Found, cap: float | None) -> np.ndarray:
+    def _needed(self, best: Found, cap: float | None, leeway: float) -> np.ndarray:
         """(n,) what each row needs so that no state has less than under the best reward, in units of the cap or R_max.
 
         Rows that count and rows that do not are apart, as in the program: each kind has its own violation.
@@ -207,10 +216,10 @@ class PartialTask:
         c, others = self.partly.comparisons, self.partly.active & ~self.counted
         least = np.minimum(self._least(best, others)[c.states], 0.0)
         counted = np.minimum(self._least(best, self.counted)[c.states], np.inf if cap is None else 1.0)
-        kept = np.where(counted > -LEEWAY, np.maximum(counted - LEEWAY, 0.0), counted)
+        kept = np.where(counted > -leeway, np.maximum(counted - leeway, 0.0), counted)
         need = np.where(self.counted, kept, least)
-        short = need < -LEEWAY
-        need[short] -= LEEWAY / (self.learner.slack or 1.0)  # a violation costs C
+        short = need < -leeway
+        need[short] -= leeway / (self.learner.slack or 1.0)  # a violation costs C
         need[~short & (need < 0)] = 0.0
         return np.where(self.partly.active, need, np.nan)
 

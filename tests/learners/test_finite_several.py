@@ -63,6 +63,10 @@ def test_nor_has_one_that_is_known_in_part(fields, unvisited):
     assert check(range(8), unknown=0.4, unvisited=unvisited, **fields | ({"l1": 0.01} if "l1" in fields else {}))[0] >= 4
 
 
+def test_a_solver_without_room_for_the_simplest_reward_is_given_more():
+    assert check([616])[0] == 1  # HiGHS finds no reward within 1e-8 of the best margins
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fields", FIELDS, ids=str)
 @pytest.mark.parametrize("unknown", [0.0, 0.4])

@@ -217,7 +217,7 @@ def test_finite_lp_result_survives_pickle():
 def test_finite_lp_stats_name_each_program():
     model = models.random_model(0)
     stats = FiniteLP(report_lambda_0=True).fit(model.mdp, model.expert).stats
-    assert list(stats["programs"]) == ["lambda_0", "uniform margin", "reward"]
+    assert list(stats["programs"]) == ["uniform margin", "lambda_0", "reward"]
 
 
 def test_finite_lp_leaves_walls_out_when_margins_are_capped():

@@ -2,6 +2,8 @@
 
 Primal: V = (I - gamma P_pi)^-1 R (5), the margins of (4), and the objective of the LP at R.
 Dual: `dual_bound`, for any multipliers of (4). Where the expert is known in part, or errs, see `learners.soft_certificate`.
+Is the expert optimal? By what the best policy earns more (`optimality`), with all rounding; row by row, a violation or a margin
+counts beyond its own rounding and what the solver of R left open (`TabularReward.tolerance`).
 Axes: S states, A actions, n rows of (4).
 """
 
@@ -12,23 +14,29 @@ import numpy as np
 
 from irl_gym._typing import Indices, Numbers, Vector
 from irl_gym.comparisons import Comparisons, compare
+from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
-from irl_gym.dynamic_programming import Discounted
+from irl_gym.dynamic_programming import optimum
+from irl_gym.howard import Optimum
+from irl_gym.margins import Margins, comparable, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import loss_of, told_loss
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
-
-OPTIMAL_WITHIN = 1e-8
-"""What solvers' feasibility leaves of (4). A violation below this, times max |R| and a tenth of 1 / (1 - gamma), is none; nor
-is such a margin one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Proven):
     """What a learned reward proves. States outside the reachable ones are not judged."""
 
-    expert_optimal: bool
-    """Is the expert optimal under R? (4) holds, to rounding."""
+    expert_optimal: bool | None
+    """Is the expert optimal under R? None where it is undecided: by `loss_bound`, or by what its unknown actions may lose."""
+    loss_low: float
+    """The best policy earns at least this more than the expert from d0 under R, in units of value, rounding included."""
+    loss_bound: float
+    """And at most this: in unknown states that the expert may reach, over all that it may do there."""
+    loss_share: float
+    """`loss_bound` as a share of what is at stake (`optimality`); NaN where every action is tied."""
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     margin: Vector
@@ -85,7 +93,7 @@ class Certificate(Proven):
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
         finite = self.margin[np.isfinite(self.margin)]
-        optimal = "yes" if self.expert_optimal else f"no, (4) is violated by {self.worst_violation:.2e}"
+        optimal = told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share)
         span = f"{finite.min():.3g} to {finite.max():.3g} in {finite.size} states" if finite.size else "none"
         lines = [
             f"expert optimal under R   {optimal}",
@@ -112,34 +120,6 @@ class Certificate(Proven):
         if self.unknown.size:
             lines.append(f"unknown                  nothing is known of the expert in {self.unknown.size} reachable states")
         return "\n".join(lines)
-
-
-def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
-    """(n,) rows that a margin is taken over: not an equality, and not trivial for the reward's kind."""
-    return ~comparisons.equal & ~comparisons.trivial if reward.on_states else ~comparisons.equal
-
-
-def row_margins(
-    mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, discounted: Discounted | None = None
-) -> np.ndarray:
-    """(n,) the margin of each row of (4) under a reward: Q(s, pi) - Q(s, a), for rewards on states as in (4).
-
-    `discounted` is I - gamma P_pi where it was factorised before.
-    """
-    discounted = discounted or Discounted(mdp.P_pi(comparisons.distribution), mdp.gamma)
-    if reward.on_states:
-        return comparisons.rows @ discounted.solve(reward.values)
-    R = reward.expected(mdp)
-    V = discounted.solve(mdp.mixing(comparisons.distribution) @ R.ravel())
-    stacked = comparisons.states * mdp.n_actions + comparisons.actions
-    return V[comparisons.states] - R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ V)
-
-
-def least_per_state(values: np.ndarray, states: np.ndarray, n_states: int) -> Vector:
-    """(S,) the smallest value of each state's rows; NaN where it has none."""
-    least = np.full(n_states, np.inf)
-    np.minimum.at(least, states, values)
-    return np.where(np.isfinite(least), least, np.nan)
 
 
 def certify(
@@ -182,15 +162,15 @@ def certify(
     part = mdp.restrict(rows)
     mdp.mixing(expert)  # checks shape and content for all states
     comparisons = compare(part, np.asarray(expert)[rows])
-    discounted = Discounted(part.P_pi(comparisons.distribution), part.gamma)
-    R = TabularReward(reward.values[rows])
-    values = row_margins(part, comparisons, R, discounted)
+    R = reward.of_rows(rows)
+    found = optimum(part, R)
+    margins = margins_of(found, comparisons)
     usable = comparable(comparisons, R)
     spoilt = comparisons.states[comparisons.trivial & ~usable & ~comparisons.equal & (margin_cap is None)]
     counted = usable & (~np.isin(comparisons.states, spoilt) if counted is None else counted)
-    violations = np.where(comparisons.equal, np.abs(values), np.maximum(-values, 0.0))
-    margins = least_per_state(values[counted], comparisons.states[counted], part.n_states)
-    total = float(np.nansum(np.minimum(margins, np.inf if margin_cap is None else margin_cap)))
+    least = least_per_state(margins.values[counted], comparisons.states[counted], part.n_states)
+    total = float(np.nansum(np.minimum(least, np.inf if margin_cap is None else margin_cap)))
+    discounted = Discounted(part.P_pi(comparisons.distribution), part.gamma)
     dual = DualBound(part, comparisons, discounted, R.on_states, counted, r_max, l1, margin_cap)
     return Certificate(
         objective=total - l1 * float(np.abs(R.values).sum()),
@@ -200,70 +180,62 @@ def certify(
         margin_cap=None if margin_cap is None else float(margin_cap),
         least_l1_norm=dual.least_l1_norm(y_l1),
         unconstrained=rows[np.setdiff1d(np.flatnonzero(~part.terminal), comparisons.states[usable])],
-        **judged(mdp, part, rows, comparisons, R, values, violations, r_max, unbreakable),
-        indifferent=tied_throughout(values, R, part),
+        **judged(mdp, rows, found, comparisons, R, margins, r_max, unbreakable),
     )
 
 
 def judged(
-    mdp: TabularMDP, part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, values: np.ndarray,
-    violations: np.ndarray, r_max: float, unbreakable: np.ndarray | None, visits: np.ndarray | None = None,
+    mdp: TabularMDP, rows: np.ndarray, found: Optimum, comparisons: Comparisons, R: TabularReward, margins: Margins,
+    r_max: float, unbreakable: np.ndarray | None, active: np.ndarray | None = None, unknown: np.ndarray | None = None,
+    visits: np.ndarray | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a certificate that do not depend on the program.
 
     Args:
         mdp: the whole MDP.
-        part: what can be reached of it.
         rows: (r,) the states of the whole that are in the part.
+        found: the optimum of the reachable part under R.
         comparisons: the rows of (4) in the part.
         R: the reward on the part.
-        values: (n,) margin of each row of (4).
-        violations: (n,) of each row of (4).
+        margins: of each row of (4).
         r_max: bound on |R|.
         unbreakable: (n,) rows that no reward makes strict; None where no program asked.
+        active: (n,) rows that are judged of an expert that may err: among actions that it takes, some may be better; None for
+            an expert whose actions are all as good, in all rows.
+        unknown: (r,) states in which nothing is known of the expert; None where there is none.
         visits: (S,) how often each state was visited; None when that is not known.
     """
-    rounding, worst = tolerated(R.largest(part), mdp.gamma), float(violations.max(initial=0.0))
+    part, equal = found.table.mdp, comparisons.equal
+    erring = active is not None
+    active = np.ones(equal.size, dtype=bool) if active is None else active
+    to_both = equal & (not erring)
+    violations = np.where(active, margins.violations(to_both), 0.0)
     paid = R.values if R.on_states else R.values[~part.terminal]
-    tied = comparisons.states[comparisons.trivial & ~comparisons.equal & R.on_states]
+    tied = comparisons.states[comparisons.trivial & ~equal & R.on_states]
     usable = comparable(comparisons, R)
     left_out = usable & (np.zeros_like(usable) if unbreakable is None else unbreakable)
     kept = usable & ~left_out
-    least = least_per_state(values[kept], comparisons.states[kept], part.n_states)
     margin = np.full(mdp.n_states, np.nan)
-    margin[rows] = least
+    margin[rows] = least_per_state(margins.values[kept], comparisons.states[kept], part.n_states)
+    without = kept & (margins.values <= margins.none)
+    which = np.flatnonzero(active & margins.violated(to_both))
+    states = rows[comparisons.states[which]].astype(np.int64)
+    loss = loss_of(found, comparisons.distribution, unknown)
     return {
-        "expert_optimal": bool(worst <= rounding),
-        "worst_violation": worst,
+        "expert_optimal": loss.optimal,
+        "loss_low": loss.low,
+        "loss_bound": loss.high,
+        "loss_share": loss.share,
+        "worst_violation": float(violations.max(initial=0.0)),
         "margin": margin,
         "l1_norm": float(np.abs(R.values).sum()),
         "constant": bool(np.ptp(paid) <= 1e-9 * r_max) if paid.size else True,
         "zero": bool(np.abs(paid).max(initial=0.0) <= 1e-9 * r_max),
+        "indifferent": bool((np.abs(margins.values) <= margins.none)[active].all()),
         "inseparable": rows[np.unique(tied)],
-        "marginless": rows[least <= rounding],
+        "marginless": rows[np.unique(comparisons.states[without])],
         "unbreakable": rows[np.unique(comparisons.states[left_out])],
         "unbreakable_rows": _pairs(comparisons, rows, left_out),
-        **violated_rows(violations, rounding, comparisons, rows, visits),
-    }
-
-
-def tied_throughout(margins: np.ndarray, R: TabularReward, part: TabularMDP) -> bool:
-    """Is no margin (n,) of (4) other than 0, to rounding, under a reward on the reachable part?"""
-    return bool(np.abs(margins).max(initial=0.0) <= tolerated(R.largest(part), part.gamma))
-
-
-def tolerated(largest: float, gamma: float) -> float:
-    """The violation of (4) that is none, for rewards up to the largest: what solvers' feasibility leaves."""
-    return OPTIMAL_WITHIN * largest * (1 + 0.1 / (1 - gamma))
-
-
-def violated_rows(
-    violations: np.ndarray, rounding: float, comparisons: Comparisons, rows: np.ndarray, visits: np.ndarray | None
-) -> dict[str, Any]:
-    """The fields of a certificate that list the violated rows, given (n,) violations and the states (r,) they are of."""
-    which = np.flatnonzero(violations > rounding)
-    states = rows[comparisons.states[which]].astype(np.int64)
-    return {
         "violated": np.unique(states),
         "violated_rows": _pairs(comparisons, rows, which),
         "violations": violations[which],

@@ -138,7 +138,7 @@ def _examined(case: Case) -> str:
     if case.mdp is None:
         return "There is no table: only what the certificate says was examined."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
-    margins = case.least[case.least > case.tolerance]
+    margins = case.margins
     if case.rows is None or not margins.size:
         return f"Examined: {where}."
     judged = int(np.isfinite(case.least).sum())

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym.comparisons import Comparisons
-from irl_gym.dynamic_programming import Discounted
+from irl_gym.discounted import Discounted
 from irl_gym.mdp import TabularMDP
 
 

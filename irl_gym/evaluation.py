@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from irl_gym import metrics
-from irl_gym._typing import ActionSets, Matrix
+from irl_gym._typing import ActionSets
 from irl_gym.curves import Curve, read_curve, two_returns
 from irl_gym.distances import epic, starc
-from irl_gym.dynamic_programming import policy_iteration, tied
+from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import NotTabular, UndefinedDistance
+from irl_gym.howard import Optimum
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp import TabularMDP
-from irl_gym.policies import support
+from irl_gym.optimality import loss_of
+from irl_gym.policies import as_distribution, support
 from irl_gym.rewards import TabularReward
 from irl_gym.scores import Scale, half_width
 from irl_gym.worlds import TableWorld
@@ -77,7 +79,7 @@ def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
     """What a score is measured by; earned are the discounted returns (N,) of episodes that were given."""
     world, rounding = loop.world, 0.0
     if isinstance(world, TableWorld):
-        rounding = metrics.tie_tolerance(world.table.mdp, world.table.reward)
+        rounding = 1e-6 * world.table.reward.largest(world.table.mdp)
     random = world.value(world.random)
     if not from_data(loop):
         return Scale(random, world.value(loop.expert), rounding, gamma=world.gamma)
@@ -137,21 +139,19 @@ def optimal_set(loop: "Loop") -> ActionSets:
     if not isinstance(world, TableWorld):
         raise NotTabular("the environment is only stepped: expected a table. Which actions are optimal is not known.")
     mdp, true = world.table.mdp, world.table.reward
-    return good_actions(mdp, true, None if loop.experiment.from_episodes else loop.expert, policy_iteration(mdp, true).Q)
+    return good_actions(mdp, None if loop.experiment.from_episodes else loop.expert, optimum(mdp, true))
 
 
-def good_actions(mdp: TabularMDP, true: TabularReward, expert: np.ndarray | None, Q: Matrix) -> ActionSets:
+def good_actions(mdp: TabularMDP, expert: np.ndarray | None, best: Optimum) -> ActionSets:
     """(S, A) the actions that agree with an expert: every optimal one if it is optimal, else those it takes.
 
     Args:
         mdp: P, gamma and d0.
-        true: the reward that judges.
         expert: (S,) actions or (S, A) probabilities; None where it errs or is known by data, and optimal actions count.
-        Q: (S, A) optimal values under the true reward.
+        best: what is optimal under the true reward.
     """
-    tolerance = metrics.tie_tolerance(mdp, true)
-    if expert is None or metrics.policy_value(mdp, true, expert) >= float(mdp.d0 @ Q.max(axis=1)) - tolerance:
-        return tied(Q, tolerance)
+    if expert is None or loss_of(best, as_distribution(expert, mdp.n_states, mdp.n_actions)).optimal:
+        return metrics.ties_of(best, 0.0).possible
     return support(expert, mdp.n_states, mdp.n_actions)
 
 

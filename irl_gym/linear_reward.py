@@ -97,7 +97,7 @@ class LinearReward:
         values = np.empty(n)
         for part in blocks(n, self.alpha.size):
             values[part] = over_rows(self.features, decode, np.arange(n)[part]) @ self.alpha
-        return TabularReward(values, self.note)
+        return TabularReward.learned(values, self.note) if "learner" in self.note else TabularReward(values, self.note)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle. Beside first, then renamed.

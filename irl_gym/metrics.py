@@ -11,15 +11,39 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.checks import checked_number
-from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_iteration, tied
+from irl_gym.dynamic_programming import evaluate_policy, occupancy, optimum, policy_iteration
 from irl_gym.errors import InvalidParameter
+from irl_gym.howard import OUTWARDS, Optimum
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
 
 TINY = float(np.finfo(np.float64).tiny)
-TIE_TOLERANCE = 1e-6
-"""Actions with Q within this of the best are greedy, in units of the reward's largest |R|."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """Which actions are as good as the best: decided by bounds of their values, rounding included."""
+
+    tied: ActionSets
+    """(S, A) as good, to the rounding of the table's own numbers; all in terminal states."""
+    undecided: ActionSets
+    """(S, A) neither tied nor worse: what the solver of a learned reward left open, or rounding, hides which."""
+
+    @property
+    def possible(self) -> ActionSets:
+        """(S, A) the actions that may be as good as the best: tied or undecided."""
+        return self.tied | self.undecided
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How often a policy does what a reward asks for, over the reachable states that are not terminal."""
+
+    share: float
+    """Share of the states in which its action is tied with the best, or may be; NaN where every start is terminal."""
+    undecided: float
+    """The part of it in which that is undecided."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +55,9 @@ class Tie:
     value: float
     """Its true value from d0."""
     tied: ActionSets
-    """(S, A) the greedy actions."""
+    """(S, A) the greedy actions, undecided ones among them."""
+    error: float
+    """Bound on how far `value` is from the worst or best, rounding included."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +70,8 @@ class Regret:
     """(S,) from each state on; 0 in terminal ones."""
     optimal: float
     """The optimal value from d0."""
+    error: float
+    """Bound on the error of `value`, rounding included."""
 
 
 def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: Any, horizon: int | None = None) -> float:
@@ -77,53 +105,87 @@ def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:
     return policy_value(mdp, reward, uniform)
 
 
-def tie_tolerance(mdp: TabularMDP, reward: TabularReward | np.ndarray, share: float = TIE_TOLERANCE) -> float:
-    """What counts as tied, in units of value: a share of the largest |R| that can be paid."""
-    return share * as_reward(reward).largest(mdp)
+def ties(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float | None = None) -> Ties:
+    """Which actions are optimal, and of which that is undecided.
 
-
-def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE) -> ActionSets:
-    """(S, A) the actions that are optimal, to a tolerance in units of the largest |R| that can be paid.
+    Args:
+        mdp: P, gamma and d0.
+        reward: (S,) paid on arrival, or (S, A).
+        tolerance: differences up to this share of the largest |R| that can be paid are undecided; None for what the reward's
+            own solver left open (`TabularReward.tolerance`), which is nothing for a reward that is given.
 
     Raises:
         InvalidMDP, InvalidReward: no table, or a reward of another.
         InvalidParameter: a negative tolerance.
     """
-    tolerance = checked_number("tolerance", tolerance, "a share of max |R| of at least 0, such as 1e-6", least=0)
-    reward = as_reward(reward)
-    return tied(policy_iteration(checked_mdp(mdp), reward).Q, tie_tolerance(mdp, reward, tolerance))
+    reward, open_ = as_reward(reward), 0.0
+    found = optimum(checked_mdp(mdp), reward)
+    if tolerance is None:
+        open_ = reward.tolerance
+    else:
+        expected = "a share of max |R| of at least 0, such as 1e-6, or None"
+        open_ = checked_number("tolerance", tolerance, expected, least=0) * reward.largest(mdp)
+    return ties_of(found, open_)
+
+
+def ties_of(found: Optimum, left_open: float) -> Ties:
+    """The ties of an optimum under a reward whose solver left differences of action values open up to `left_open`."""
+    low, high = found.gaps
+    tied = (high <= found.level) | found.table.mdp.terminal[:, None]
+    return Ties(tied, (low <= found.level + left_open) & ~tied)
+
+
+def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float | None = None) -> ActionSets:
+    """(S, A) the actions that are or may be optimal; arguments and errors as `ties`."""
+    return ties(mdp, reward, tolerance=tolerance).possible
 
 
 def worst_tie(
-    mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
+    mdp: TabularMDP,
+    learned: TabularReward | np.ndarray,
+    true: TabularReward | np.ndarray,
+    *,
+    tolerance: float | None = None,
 ) -> Tie:
-    """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions."""
-    ties = optimal_actions(mdp, learned, tolerance=tolerance)
-    worst = policy_iteration(mdp, -as_reward(true).expected(mdp), allowed=ties)
-    return Tie(worst.policy, -float(mdp.d0 @ worst.V), ties)
+    """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions.
+
+    Undecided actions count as tied: what a solver left open, an agent may take. Arguments and errors as `ties`.
+    """
+    allowed = optimal_actions(mdp, learned, tolerance=tolerance)
+    worst = policy_iteration(mdp, _negative(true), allowed=allowed)
+    return Tie(worst.policy, -float(mdp.d0 @ worst.V), allowed, worst.error)
 
 
 def best_tie(
-    mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
+    mdp: TabularMDP,
+    learned: TabularReward | np.ndarray,
+    true: TabularReward | np.ndarray,
+    *,
+    tolerance: float | None = None,
 ) -> Tie:
     """The best policy under `true` among those greedy under `learned`: what a learner with luck finds."""
-    ties = optimal_actions(mdp, learned, tolerance=tolerance)
-    best = policy_iteration(mdp, as_reward(true).expected(mdp), allowed=ties)
-    return Tie(best.policy, float(mdp.d0 @ best.V), ties)
+    allowed = optimal_actions(mdp, learned, tolerance=tolerance)
+    best = policy_iteration(mdp, as_reward(true), allowed=allowed)
+    return Tie(best.policy, float(mdp.d0 @ best.V), allowed, best.error)
+
+
+def _negative(reward: TabularReward | np.ndarray) -> TabularReward:
+    return TabularReward(-as_reward(reward).values)
 
 
 def regret(mdp: TabularMDP, true: TabularReward | np.ndarray, policy: Any) -> Regret:
-    """V* - V_pi under the true reward, from d0 and from each state.
+    """V* - V_pi under the true reward, from d0 and from each state; found as a sum of losses, not as a difference of values.
 
     Args:
         mdp: P, gamma and d0.
         true: (S,) paid on arrival, or (S, A).
         policy: (S,) actions, (S, A) probabilities or set.
     """
-    true = as_reward(true)
-    best = policy_iteration(checked_mdp(mdp), true).V
-    lost = np.maximum(best - evaluate_policy(mdp, true, policy), 0.0)  # below 0 by rounding only
-    return Regret(float(mdp.d0 @ lost), lost, float(mdp.d0 @ best))
+    found = optimum(checked_mdp(mdp), as_reward(true))
+    behind, unsure = found.behind(as_distribution(policy, mdp.n_states, mdp.n_actions))
+    lost = np.maximum(behind, 0.0)  # below 0 by rounding only
+    error = float(mdp.d0 @ (unsure + found.error)) * (1 + OUTWARDS)
+    return Regret(float(mdp.d0 @ lost), lost, float(mdp.d0 @ found.W.values), error)
 
 
 def expected_value_difference(
@@ -132,7 +194,7 @@ def expected_value_difference(
     learned: TabularReward | np.ndarray,
     expert: Any = None,
     *,
-    tolerance: float = TIE_TOLERANCE,
+    tolerance: float | None = None,
 ) -> float:
     """Expert's value less that of a policy planned for the learned reward, both under the true one and from d0.
 
@@ -145,7 +207,7 @@ def expected_value_difference(
         true: (S,) paid on arrival, or (S, A).
         learned: the same, of either kind.
         expert: (S,) actions, (S, A) probabilities or set; None for an optimal one.
-        tolerance: what counts as tied; see `optimal_actions`.
+        tolerance: what counts as tied; see `ties`.
     """
     true = as_reward(true)
     value = float(checked_mdp(mdp).d0 @ policy_iteration(mdp, true).V) if expert is None else policy_value(mdp, true, expert)
@@ -178,13 +240,15 @@ def agreement(mdp: TabularMDP, policy: Any, good: ActionSets) -> float:
 
 
 def tie_aware_agreement(
-    mdp: TabularMDP, learned: TabularReward | np.ndarray, expert: Any, *, tolerance: float = TIE_TOLERANCE
-) -> float:
-    """Share of the reachable, non-terminal states whose expert's action is within a tolerance of the learned reward's best.
+    mdp: TabularMDP, learned: TabularReward | np.ndarray, expert: Any, *, tolerance: float | None = None
+) -> Agreement:
+    """Share of the reachable, non-terminal states whose expert's action is, or may be, the learned reward's best.
 
     Comparing the actions of two greedy policies calls every tie broken differently a disagreement; this does not.
+    Arguments and errors as `ties`.
     """
-    return agreement(mdp, expert, optimal_actions(mdp, learned, tolerance=tolerance))
+    found = ties(mdp, learned, tolerance=tolerance)
+    return Agreement(agreement(mdp, expert, found.possible), agreement(mdp, expert, found.undecided))
 
 
 def occupancy_distance(

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.intervals import as_interval
+from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
@@ -173,7 +174,8 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
     best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
     seen = metrics["demonstrations"]["episodes_only"] and "fell_short" not in reward
     judged = "; judged are the actions most frequent in its episodes" if seen else ""
-    yield "expert optimal under it", f"{best if reward['expert_optimal'] else _why_not(reward)}{judged}"
+    optimal = told_record(reward) or (best if reward["expert_optimal"] else _why_not(reward))
+    yield "expert optimal under it", f"{optimal}{judged}"
     if reward.get("unknown_states"):
         of_all = f"{reward['unknown_states']:,} of {metrics['table']['reachable']:,}"
         yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"
@@ -208,10 +210,6 @@ def _zero(value: float) -> float:
 
 
 def _why_not(reward: Mapping[str, Any]) -> str:
-    if "violated_states" in reward:
-        count = reward["violated_states"]
-        where = "1 state" if count == 1 else f"{count:,} states"
-        return f"not in {where}, where another action is better by {reward['worst_violation']:.3g} at most"
     if "regret" in reward:
         noise = reward["regret_error"]
         give = ", and one episode tells no noise" if noise is None else f" +- {noise:.2g}"

@@ -18,11 +18,13 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import Matrix
-from irl_gym.checks import float_array
+from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidReward
 from irl_gym.mdp import TransitionTable
 
 FORMAT = "irl_gym.TabularReward/1"
+SOLVED_WITHIN = 1e-6
+"""Share of the largest |R| that solvers of linear programs leave of differences of action values."""
 UNREADABLE = (
     ValueError, KeyError, EOFError, TypeError, RuntimeError, OSError, AttributeError, struct.error, zipfile.BadZipFile,
     zlib.error,
@@ -53,6 +55,9 @@ class TabularReward:
     """(S,) or (S, A) float64."""
     note: Mapping[str, Any] = field(default_factory=dict)
     """Where it comes from; anything json can hold."""
+    tolerance: float = 0.0
+    """What the solver of a learned reward left open of each difference of action values, in units of value; 0 for a reward that
+    is given."""
 
     def __post_init__(self) -> None:
         values = float_array("the reward", self.values, "(S,) or (S, A) numbers", InvalidReward)
@@ -62,11 +67,17 @@ class TabularReward:
         if wrong.size:
             where = tuple(int(i) for i in wrong[0])
             raise InvalidReward(f"R{list(where)} is {values[where]}: a reward is a finite number.")
+        checked_number("tolerance", self.tolerance, "a number of at least 0, in units of value", least=0, error=InvalidReward)
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
 
+    @classmethod
+    def learned(cls, values: np.ndarray, note: Mapping[str, Any]) -> "TabularReward":
+        """A reward that a solver found, with the tolerance of its solution."""
+        return cls(values, note, SOLVED_WITHIN * float(np.abs(values).max(initial=0.0)))
+
     def __reduce__(self) -> tuple:
-        return type(self), (self.values, dict(self.note))
+        return type(self), (self.values, dict(self.note), self.tolerance)
 
     def __repr__(self) -> str:
         kind = "on arrival" if self.on_states else "for the step"
@@ -81,6 +92,10 @@ class TabularReward:
     def on_states(self) -> bool:
         """Is this a reward on states, paid on arrival?"""
         return self.values.ndim == 1
+
+    def of_rows(self, rows: np.ndarray) -> "TabularReward":
+        """The same reward on some of the states only, renumbered in the order given."""
+        return TabularReward(self.values[rows], self.note, self.tolerance)
 
     def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
         """The reward of steps (s, a, s'): scalars or arrays (N,) in, the same shape out."""
@@ -112,7 +127,8 @@ class TabularReward:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an npz without pickle: `values` and `note` (json). Beside first, then renamed."""
-        write_archive(path, {"format": FORMAT, "note": dict(self.note)}, {"values": self.values})
+        header = {"format": FORMAT, "note": dict(self.note), "tolerance": self.tolerance}
+        write_archive(path, header, {"values": self.values})
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> "TabularReward":
@@ -125,7 +141,10 @@ class TabularReward:
         header, arrays = read_archive(path, cls.FORMATS)
         if "values" not in arrays:
             raise InvalidReward(f"{path} has no values: expected a file written by TabularReward.save.")
-        return cls(arrays["values"], header.get("note", {}))
+        note = header.get("note", {})
+        if "tolerance" not in header and "learner" in note:  # a file from before tolerances were kept
+            return cls.learned(arrays["values"], note)
+        return cls(arrays["values"], note, header.get("tolerance", 0.0))
 
 
 def write_archive(path: str | os.PathLike, header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
-from irl_gym.dynamic_programming import backup, policy_iteration
+from irl_gym.dynamic_programming import backup, optimum
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
@@ -52,7 +52,9 @@ class PositiveScaling:
 
     def apply(self, reward: TabularReward, mdp: TabularMDP) -> TabularReward:
         """The scaled reward, of the same shape."""
-        return TabularReward(self.factor * reward.values, {**reward.note, "scaled_by": self.factor})
+        return TabularReward(
+            self.factor * reward.values, {**reward.note, "scaled_by": self.factor}, self.factor * reward.tolerance
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,9 @@ class PotentialShaping:
                 f"the potential of terminal state {wrong[0]} is {phi[wrong[0]]}: expected 0, or the optimal policies change."
             )
         shaped = backup(mdp, reward.expected(mdp), phi) - phi[:, None]
-        return TabularReward(np.where(mdp.terminal[:, None], 0.0, shaped), {**reward.note, "shaped": "potential"})
+        return TabularReward(
+            np.where(mdp.terminal[:, None], 0.0, shaped), {**reward.note, "shaped": "potential"}, reward.tolerance
+        )
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ class ExpectedAdvantage:
     What an agent pays is then what its action loses, at once: the optimal actions, 0, are greedy whatever the discount.
     With `clip` = tau every loss counts up to tau, in units of tau: R' = max(A, -tau) / tau, between -1 and 0. Optimal actions
     still pay 0 and all others less, so the optimal policies stay (a sum of non-positive payments is 0 only if all are).
-    A loss within the rounding of V, 1e-12 max |Q| / (1 - gamma), is no loss: ties stay ties.
+    A loss within the rounding of the table's own numbers is no loss: ties stay ties.
 
     Raises:
         InvalidParameter: a clip that is not positive.
@@ -105,14 +109,13 @@ class ExpectedAdvantage:
 
     def apply(self, reward: TabularReward, mdp: TabularMDP) -> TabularReward:
         """The advantage (S, A)."""
-        Q = policy_iteration(mdp, reward.expected(mdp)).Q
-        advantage = Q - Q.max(axis=1, keepdims=True)
-        rounding = 1e-12 * float(np.abs(Q).max()) / (1 - mdp.gamma)
-        advantage[advantage >= -rounding] = 0.0
+        found = optimum(mdp, reward)
+        gains = found.advantages.values.astype(np.float64)
+        advantage = np.where(found.tied() | mdp.terminal[:, None], 0.0, gains - gains.max(axis=1, keepdims=True))
+        unit = 1.0
         if self.clip is not None:
-            advantage = np.maximum(advantage, -self.clip) / self.clip
-        advantage[mdp.terminal] = 0.0
-        return TabularReward(advantage, {**reward.note, "shaped": "expected advantage"})
+            advantage, unit = np.maximum(advantage, -self.clip) / self.clip, self.clip
+        return TabularReward(advantage, {**reward.note, "shaped": "expected advantage"}, reward.tolerance / unit)
 
 
 def typical_loss(reward: TabularReward, mdp: TabularMDP) -> float | None:

@@ -5,7 +5,8 @@ import models
 import numpy as np
 import pytest
 
-from irl_gym.dynamic_programming import Discounted, value_iteration
+from irl_gym.discounted import Discounted
+from irl_gym.dynamic_programming import value_iteration
 from irl_gym.errors import InvalidDiscount, InvalidParameter, InvalidPolicy, NotSettable
 from irl_gym.features import OneHot, Table
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound

@@ -10,6 +10,7 @@ from irl_gym.dynamic_programming import evaluate_policy, occupancy, policy_itera
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import (
+    Agreement,
     agreement,
     best_tie,
     expected_value_difference,
@@ -191,12 +192,12 @@ def test_expected_value_difference_is_negative_when_the_expert_errs_and_the_rewa
 def test_tie_aware_agreement_counts_ties_broken_otherwise():
     model = models.random_model(0)
     flat = TabularReward(np.zeros(model.mdp.n_states))
-    assert tie_aware_agreement(model.mdp, flat, model.expert) == 1.0
+    assert tie_aware_agreement(model.mdp, flat, model.expert) == Agreement(1.0, 0.0)
 
 
 def test_tie_aware_agreement_is_zero_for_the_opposite_reward():
     opposite = np.array([0.0, -1.0, 1.0])
-    assert tie_aware_agreement(two_ways(), opposite, ZEROS) == 0.0
+    assert tie_aware_agreement(two_ways(), opposite, ZEROS) == Agreement(0.0, 0.0)
     assert tie_aware_agreement(two_ways(), -opposite, ZEROS) == 1.0
 
 

@@ -42,7 +42,7 @@ def test_metrics_refuse_an_environment_where_a_table_is_expected(call):
 
 
 @pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("tolerance", [-1e-6, np.nan, None])
+@pytest.mark.parametrize("tolerance", [-1e-6, np.nan])
 def test_a_tolerance_of_ties_is_a_share(tolerance):
     with pytest.raises(InvalidParameter, match=r"tolerance is .*: expected a share"):
         tie_aware_agreement(TWO_WAYS, FLAT, ZEROS, tolerance=tolerance)

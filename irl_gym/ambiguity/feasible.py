@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from irl_gym._typing import Indices, Matrix, Numbers, StateMask, Vector
-from irl_gym.certificate import least_per_state, row_margins, tolerated, violated_rows
 from irl_gym.checks import checked_number, checked_rng, float_array
 from irl_gym.comparisons import Comparisons, compare
-from irl_gym.dynamic_programming import Discounted, policy_iteration
+from irl_gym.dynamic_programming import optimum, policy_iteration
 from irl_gym.errors import InvalidParameter
+from irl_gym.howard import as_told
 from irl_gym.learners.feature_rows import completed
+from irl_gym.margins import least_per_state, margins_of
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward, as_reward
 
@@ -73,12 +73,16 @@ def pose(mdp: TabularMDP, expert: Any) -> Posed:
 class Membership:
     """Is a reward one under which the expert is optimal, and why. States that are never reached are not judged: NaN."""
 
-    member: bool
-    """Is the expert optimal under R? (4) holds, to rounding."""
+    member: bool | None
+    """Does every row of (4) hold, in every state? None where rounding hides whether one does."""
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     tolerance: float
-    """A violation up to this is none."""
+    """A violation up to this is none, beside the rounding of the table's numbers: what the solver of R left open."""
+    undecided: int
+    """Rows of (4) that neither hold nor are violated for certain."""
+    ties: int
+    """States without a margin, of those that R could give one."""
     margin: Vector
     """(S,) smallest margin of the expert over another action; NaN where (4) has no row that R can move."""
     violated_rows: np.ndarray
@@ -93,6 +97,11 @@ class Membership:
     def __str__(self) -> str:
         """The finding in a sentence or two."""
         finite = self.margin[np.isfinite(self.margin)]
+        if self.member is None:
+            return (
+                f"Undecided: no row of (4) is violated for certain, and rounding hides whether {self.undecided} of them hold; "
+                f"the largest violation is {self.worst_violation:.3g}."
+            )
         if not self.member:
             worst = np.flatnonzero(self.violations >= (1 - 1e-6) * self.worst_violation)[0]  # the first of equals
             s, a = self.violated_rows[worst]
@@ -103,8 +112,7 @@ class Membership:
             )
         if not finite.size:
             return "The expert is optimal: no row of (4) compares it with an action of other successors."
-        ties = int((finite <= self.tolerance).sum())
-        tied = f"; in {ties} of {finite.size} states another action is as good" if ties else ""
+        tied = f"; in {self.ties} of {finite.size} states another action is as good" if self.ties else ""
         return f"The expert is optimal, with margins from {max(finite.min(), 0.0):.3g} to {finite.max():.3g}{tied}."
 
     def to_json(self) -> dict[str, Any]:
@@ -132,8 +140,8 @@ def membership(
         expert: (S,) actions, (S, A) probabilities or (S, A) set; rows of NaN where nothing is known: no rows there. In a state
             where it takes several actions these have to be equally good.
         reward: (S,) paid on arrival, judged as in (4), or (S, A).
-        tolerance: a violation up to this, in units of value, is none; the default is the rounding of solvers,
-            `certificate.tolerated`.
+        tolerance: a violation up to this, in units of value, is none, beside the rounding of the table's numbers; the default
+            is what the solver of the reward left open (`TabularReward.tolerance`), nothing for a reward that is given.
 
     Raises:
         InvalidMDP: not a TabularMDP.
@@ -143,33 +151,33 @@ def membership(
     """
     posed, reward = pose(mdp, expert), as_reward(reward)
     reward.expected(mdp)  # checks the shape
-    part, R = posed.part, TabularReward(reward.values[posed.rows])
-    if tolerance is None:
-        tolerance = tolerated(R.largest(part), part.gamma)
+    part, R = posed.part, reward.of_rows(posed.rows)
+    tolerance = R.tolerance if tolerance is None else tolerance
     tolerance = checked_number("tolerance", tolerance, "a number of at least 0, in units of value, or None", least=0)
     posed = _acting_best(posed, R)
-    c = posed.comparisons
-    discounted = Discounted(part.P_pi(c.distribution), part.gamma)
-    values = row_margins(part, c, R, discounted)
+    c, found = posed.comparisons, optimum(part, R)
+    margins = margins_of(found, c, tolerance)
     usable = posed.movable(R.on_states)
-    violations = np.where(c.equal, np.abs(values), np.maximum(-values, 0.0))
-    found = violated_rows(violations, tolerance, c, posed.rows, None)
-    paid = R.values if R.on_states else part.mixing(c.distribution) @ R.expected(part).ravel()
-    V = discounted.solve(paid)
-    following = part.gamma * (part.P @ V).reshape(part.n_states, part.n_actions)
-    advantages = V[:, None] - following - (R.values[:, None] if R.on_states else R.expected(part))
+    violations, held, violated = margins.violations(c.equal), margins.hold(c.equal), margins.violated(c.equal)
+    behind, unsure = found.behind(c.distribution)
+    V, advantages = found.V - behind, np.mean(found.less_than(behind, unsure), axis=0)
+    if R.on_states:  # V = R + gamma W, and Q likewise
+        V, advantages = R.values + part.gamma * V, part.gamma * advantages
     advantages[part.terminal] = 0.0
     spread = {
-        "margin": least_per_state(values[usable], c.states[usable], part.n_states),
+        "margin": least_per_state(margins.values[usable], c.states[usable], part.n_states),
         "V": V,
         "advantages": advantages,
     }
+    undecided = int((~held & ~violated).sum())
     return Membership(
-        member=not found["violations"].size,
+        member=False if violated.any() else (None if undecided else True),
         worst_violation=float(violations.max(initial=0.0)),
         tolerance=tolerance,
-        violated_rows=found["violated_rows"],
-        violations=found["violations"],
+        undecided=undecided,
+        ties=np.unique(c.states[usable & (margins.values <= margins.none)]).size,
+        violated_rows=np.stack([posed.rows[c.states[violated]], c.actions[violated]], axis=1).astype(np.int64),
+        violations=violations[violated],
         **{name: over_all_states(posed, mdp, array) for name, array in spread.items()},
     )
 
@@ -185,23 +193,13 @@ def _acting_best(posed: Posed, R: TabularReward) -> Posed:
     """The same, with an expert that acts best where nothing is known of it, given what it does elsewhere."""
     if posed.known.all():
         return posed
-    part, c = posed.part, posed.comparisons
-    S, A = part.n_states, part.n_actions
-    fixed = np.where(posed.known[:, None], c.distribution, 0.0)[:, None, :].repeat(A, axis=1)
-    fixed[~posed.known] = np.eye(A)
-    mixing = _block_rows(fixed)  # (S*A, S*A): in a known state every action does what the expert does
-    as_expert = TabularMDP(mixing @ part.P, part.gamma, part.d0)
-    paid = (mixing @ R.expected(part).ravel()).reshape(S, A)
+    part, told = posed.part, posed.comparisons.distribution
+    as_expert = TabularMDP(as_told(part, told, ~posed.known), part.gamma, part.d0)
+    paid = R.expected(part)
+    paid = np.where(posed.known[:, None], (told * paid).sum(axis=1, keepdims=True), paid)
     best = policy_iteration(as_expert, paid).policy
-    distribution = np.where(posed.known[:, None], c.distribution, np.eye(A)[best])
+    distribution = np.where(posed.known[:, None], told, np.eye(part.n_actions)[best])
     return Posed(posed.rows, part, posed.known, compare(part, distribution, np.flatnonzero(posed.known)))
-
-
-def _block_rows(blocks: np.ndarray) -> Any:
-    """(S*A, S*A) sparse, with the S blocks (A, A) on its diagonal."""
-    S, A, _ = blocks.shape
-    s, row, column = np.nonzero(blocks)
-    return sp.csr_array((blocks[s, row, column], (s * A + row, s * A + column)), shape=(S * A, S * A))
 
 
 def feasible_reward(mdp: TabularMDP, expert: Any, V: Any, advantages: Any) -> TabularReward:

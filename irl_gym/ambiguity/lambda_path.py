@@ -117,7 +117,7 @@ class LambdaPath:
         """
         piece = self.piece(lam)
         values = np.zeros(self.rewards.shape[1:]) if piece is None else self.rewards[piece].copy()
-        return TabularReward(values, {"learner": "FiniteLP", "l1": float(lam), "piece": piece})
+        return TabularReward.learned(values, {"learner": "FiniteLP", "l1": float(lam), "piece": piece})
 
     def objective(self, lam: float) -> float:
         """f(lambda) = T - lambda N of the piece; at most `gap` below the optimum.

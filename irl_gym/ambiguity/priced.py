@@ -13,11 +13,11 @@ import numpy as np
 
 from irl_gym.ambiguity.envelope import Line
 from irl_gym.ambiguity.priced_rewards import PricedRewards
-from irl_gym.certificate import least_per_state, row_margins
 from irl_gym.comparisons import compare
+from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
-from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import SolverFailed, SolverTimeout
+from irl_gym.margins import least_per_state, row_margins
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.warm_lp import Vertex, WarmLP

@@ -12,16 +12,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
-from irl_gym.certificate import least_per_state, row_margins, tolerated
+from irl_gym._typing import ActionSets, Indices, Matrix, Numbers, StateMask, Vector
 from irl_gym.comparisons import compare
-from irl_gym.dynamic_programming import Solution, policy_iteration, tied
+from irl_gym.discounted import EPSILON
+from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import DegenerateExpert, IrlGymError
+from irl_gym.howard import Optimum
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.margins import Margins, best_margins, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import TIE_TOLERANCE, Tie, tie_tolerance, worst_tie
+from irl_gym.metrics import Tie, ties_of, worst_tie
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 
@@ -43,6 +45,10 @@ class Rows:
     """(n,) both actions have the same successors."""
     margins: np.ndarray
     """(n,) Q(s, pi) - Q(s, a); NaN without a reward."""
+    unsure: np.ndarray
+    """(n,) they are within this of the exact ones."""
+    none: np.ndarray
+    """(n,) a margin or a violation up to this is none."""
     usable: np.ndarray
     """(n,) rows that a reward of this kind can give a margin."""
 
@@ -50,6 +56,16 @@ class Rows:
     def violations(self) -> np.ndarray:
         """(n,) by how much each row of (4) is violated."""
         return np.where(self.equal, np.abs(self.margins), np.maximum(-self.margins, 0.0))
+
+    @property
+    def violated(self) -> np.ndarray:
+        """(n,) rows that are violated for certain."""
+        return self.violations - self.unsure > self.none
+
+    @property
+    def tied(self) -> np.ndarray:
+        """(n,) rows whose margin is none, and no violation."""
+        return np.abs(self.margins) <= self.none
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,14 +140,14 @@ class Case:
         return self.has_expert and bool(self.known[self.acting].all())
 
     @cached_property
-    def optimum(self) -> Solution | None:
+    def optimum(self) -> Optimum | None:
         """What acting best is worth under R."""
-        return None if self.mdp is None or self.reward is None else policy_iteration(self.mdp, self.reward, tolerance=0.0)
+        return None if self.mdp is None or self.reward is None else optimum(self.mdp, self.reward)
 
     @cached_property
-    def true_optimum(self) -> Solution | None:
+    def true_optimum(self) -> Optimum | None:
         """What acting best is worth under the true reward."""
-        return None if self.mdp is None or self.true is None else policy_iteration(self.mdp, self.true)
+        return None if self.mdp is None or self.true is None else optimum(self.mdp, self.true)
 
     @cached_property
     def scale(self) -> float:
@@ -139,17 +155,10 @@ class Case:
         return 0.0 if self.reward is None or self.mdp is None else self.reward.largest(self.mdp)
 
     @cached_property
-    def tolerance(self) -> float:
-        """A margin or a violation below this is the solvers' rounding."""
-        if self.mdp is None or self.reward is None:
-            return 0.0
-        return tolerated(self.scale, self.mdp.gamma)
-
-    @cached_property
     def ties(self) -> ActionSets:
-        """(S, A) actions that are greedy under R. Ask only where there is a reward in a table."""
-        assert self.optimum is not None
-        return tied(self.optimum.Q, TIE_TOLERANCE * self.scale)
+        """(S, A) actions that are or may be greedy under R. Ask only where there is a reward in a table."""
+        assert self.optimum is not None and self.reward is not None
+        return ties_of(self.optimum, self.reward.tolerance).possible
 
     @cached_property
     def continued(self) -> Matrix | None:
@@ -168,8 +177,11 @@ class Case:
 
     @cached_property
     def true_tie(self) -> float:
-        """Differences up to this are none, in values under the true reward; 0 where it is not known."""
-        return 0.0 if self.mdp is None or self.true is None else tie_tolerance(self.mdp, self.true)
+        """Differences of values from the start up to this are rounding, under the true reward; 0 where it is not known."""
+        if self.mdp is None or self.true_optimum is None:
+            return 0.0
+        size = float(self.mdp.d0 @ np.abs(self.true_optimum.V)) / (1 - self.mdp.gamma)
+        return float(self.mdp.d0 @ self.true_optimum.error) + 64 * EPSILON * size
 
     @cached_property
     def rows(self) -> Rows | None:
@@ -184,16 +196,16 @@ class Case:
         if gamma is not None:
             part = TabularMDP(part.P, gamma, part.d0)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
-        margins = np.full(c.states.size, np.nan)
+        nothing = np.full(c.states.size, np.nan)
+        margins = Margins(nothing, nothing, nothing)
         if self.reward is not None:
-            R = TabularReward(self.reward.values[keep])
-            if self.fully_known:
-                margins = row_margins(part, c, R)
-            else:  # what follows an unknown state is worth what acting best is, as in `learners.soft_certificate`
-                Q = policy_iteration(part, R, tolerance=0.0).Q
-                margins = (c.distribution * Q).sum(axis=1)[c.states] - Q[c.states, c.actions]
+            found = optimum(part, self.reward.of_rows(keep))
+            # What follows an unknown state is worth what acting best is, as in `learners.soft_certificate`.
+            margins = margins_of(found, c) if self.fully_known else best_margins(found, c)
         usable = ~c.equal & (~c.trivial | (not self.on_states))
-        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, usable)
+        return Rows(
+            keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins.values, margins.unsure, margins.none, usable
+        )
 
     @cached_property
     def least(self) -> Vector:
@@ -204,12 +216,23 @@ class Case:
         return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
 
     @cached_property
+    def margins(self) -> Numbers:
+        """(m,) the smallest margins of the states in which every row that R can move has one."""
+        if self.rows is None or self.mdp is None or self.reward is None:
+            return np.zeros(0)
+        usable = self.rows.usable
+        left = least_per_state((self.rows.margins - self.rows.none)[usable], self.rows.states[usable], self.mdp.n_states)
+        return self.least[left > 0]
+
+    @cached_property
+    def prefers(self) -> bool:
+        """Is some action worse than another under R, for certain?"""
+        return self.optimum is not None and not self.ties[self.acting].all()
+
+    @property
     def speaks(self) -> bool:
         """Does R prefer some action to another, in a table with an expert?"""
-        if self.optimum is None or not self.has_expert:
-            return False
-        Q = self.optimum.Q[self.acting]
-        return bool((Q.max(axis=1) - Q.min(axis=1)).max(initial=0.0) > self.tolerance)
+        return self.prefers and self.has_expert
 
     @cached_property
     def judges_states(self) -> bool:

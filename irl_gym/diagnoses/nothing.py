@@ -75,7 +75,7 @@ def nothing_to_compare(case: Case) -> Finding | None:
 
 def unexplained_expert(case: Case) -> Finding | None:
     """(4) may hold only with every margin 0, as for R = 0 (Ng & Russell 2000, section 3.1). By one linear program."""
-    asked = case.reward is None or not case.speaks or not (case.least > case.tolerance).any() or _violated(case)
+    asked = case.reward is None or not case.speaks or not case.margins.size or _violated(case)
     if not (asked and case.judges_states and case.rows is not None and case.rows.usable.any()):
         return None
     if not isinstance(case.best, DegenerateExpert):
@@ -96,7 +96,7 @@ def unexplained_expert(case: Case) -> Finding | None:
 
 
 def _violated(case: Case) -> bool:
-    return case.rows is not None and bool((case.rows.violations > case.tolerance).any())
+    return case.rows is not None and bool(case.rows.violated.any())
 
 
 def no_reward(case: Case) -> Finding | None:
@@ -131,8 +131,7 @@ def constant_reward(case: Case) -> Finding | None:
     if not case.on_states:
         paid = paid[case.acting[case.states]]
     same = float(np.ptp(paid)) <= 1e-9 * case.scale
-    Q = case.optimum.Q[case.acting]
-    if not same and Q.size and float((Q.max(axis=1) - Q.min(axis=1)).max()) > case.tolerance:
+    if not same and case.prefers:
         return None
     what = f"is {paid.flat[0]:.4g} in every reachable state" if same else "pays every action alike in every reachable state"
     ends = case.states[case.mdp.terminal[case.states]]

@@ -14,7 +14,7 @@ def violated(case: Case) -> Finding | None:
     rows = case.rows
     if rows is None or case.reward is None or not (case.judges_states and case.speaks):
         return None
-    which = np.flatnonzero(rows.violations > case.tolerance)
+    which = np.flatnonzero(rows.violated)
     if not which.size:
         return None
     which = which[np.argsort(-rows.violations[which], kind="stable")]
@@ -57,10 +57,10 @@ def same_successors(case: Case) -> Finding | None:
     if rows is None or not (case.judges_states and case.on_states):
         return None
     tied = rows.trivial & ~rows.equal
-    if case.true_optimum is not None and case.true is not None:
-        Q = case.true_optimum.Q
+    if case.true_optimum is not None:
+        Q, level = case.true_optimum.Q, case.true_optimum.level
         theirs = (case.distribution * Q).sum(axis=1)
-        tied &= theirs[rows.states] - Q[rows.states, rows.actions] > case.true_tie
+        tied &= (theirs[:, None] - Q > level)[rows.states, rows.actions]
     which = np.flatnonzero(tied)
     if not which.size:
         return None
@@ -73,8 +73,7 @@ def same_successors(case: Case) -> Finding | None:
 
 def _marginless(case: Case, rows: Rows) -> np.ndarray:
     """(k,) rows that a reward of this kind can move and that have no margin, without being violated."""
-    small = (rows.margins <= case.tolerance) & (rows.margins >= -case.tolerance)
-    return np.flatnonzero(rows.usable & small)
+    return np.flatnonzero(rows.usable & rows.tied)
 
 
 def avoidable_ties(case: Case) -> Finding | None:

@@ -3,10 +3,10 @@
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym.certificate import least_per_state, tolerated
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding, counted, named
 from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 
@@ -94,19 +94,24 @@ def gamma_near_one(case: Case) -> Finding | None:
     """I - gamma P_pi has a condition number of about 1 / (1 - gamma), by which rounding and solvers' residuals grow in V."""
     if case.mdp is None or case.scale == 0 or not case.speaks:
         return None
-    margins = case.least[case.least > 0]
-    if not margins.size or case.tolerance <= max(VANISHED * case.scale, 0.1 * (typical := float(np.median(margins)))):
+    margins, left_open = case.least[case.least > 0], _left_open(case.scale, case.mdp.gamma)
+    if not margins.size or left_open <= max(VANISHED * case.scale, 0.1 * (typical := float(np.median(margins)))):
         return None
     tried = (g for g in (0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999) if g < case.mdp.gamma)
-    fine = [g for g in tried if tolerated(case.scale, g) <= 0.01 * typical]
+    fine = [g for g in tried if _left_open(case.scale, g) <= 0.01 * typical]
     mend = f"A smaller gamma: {fine[-1]:g} is safe for margins of this size." if fine else "A smaller gamma, or larger margins."
     return Finding(
         "gamma-near-one",
         f"gamma is so near 1 that margins drown: 1 / (1 - gamma) is {1 / (1 - case.mdp.gamma):.3g}, so a solver's residuals "
-        f"leave {case.tolerance:.2g} of a margin open, and the typical one is {typical:.2g}.",
+        f"leave {left_open:.2g} of a margin open, and the typical one is {typical:.2g}.",
         mend,
         flags=(f"--gamma {fine[-1]:g}",) if fine else ("--gamma",),
     )
+
+
+def _left_open(largest: float, gamma: float) -> float:
+    """What solvers' feasibility, 1e-8 of the largest |R|, leaves of a margin: a tenth of the condition number of it."""
+    return 1e-8 * largest * (1 + 0.1 / (1 - gamma))
 
 
 def never_ends(case: Case) -> Finding | None:
@@ -116,7 +121,7 @@ def never_ends(case: Case) -> Finding | None:
     if case.mdp.terminal[case.states].any() or _absorbing(case.mdp)[case.states].any():
         return None
     level = float(np.abs(case.optimum.V[case.states]).max())
-    margins = case.least[case.least > case.tolerance]
+    margins = case.margins
     if margins.size and np.median(margins) > FAINT * level:
         return None
     told = f"margins are typically {np.median(margins):.2g}" if margins.size else "there is no margin at all"
@@ -141,7 +146,7 @@ def faint_margins(case: Case) -> Finding | None:
     """An agent that learns from samples sees the range of V first and the margins last. Shaping (Ng, Harada & Russell 1999)."""
     if case.shaped or case.optimum is None or not case.speaks or not case.judges_states:
         return None
-    margins = case.least[case.least > case.tolerance]
+    margins = case.margins
     span = float(np.ptp(case.optimum.V[case.states]))
     if not margins.size or (typical := float(np.median(margins))) >= FAINT * span:
         return None

@@ -27,7 +27,7 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym.checks import checked_number, float_array
-from irl_gym.dynamic_programming import Discounted
+from irl_gym.discounted import Discounted
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
@@ -146,8 +146,7 @@ class FeatureLP:
         solved = self._solve(found)
         weights = solved.weights
         reward = self._reward(weights)
-        values = reward.tabular(mdp.n_states if states is None else states).values
-        judged = judge_table(mdp, expert, known, values, discounted)
+        judged = judge_table(mdp, expert, known, reward.tabular(mdp.n_states if states is None else states))
         certificate = self._certificate(found, solved, judged, None)
         return IRLResult(reward, solved.status, certificate.objective, certificate, self._stats(weights, found))
 
@@ -181,6 +180,7 @@ class FeatureLP:
             np.zeros(len(S_0)),
             tolerance,
             bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING * found.rows.scale),
+            None,
         )
         certificate = self._certificate(found, solved, judged, error)
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
@@ -252,8 +252,12 @@ class FeatureLP:
         rows, alpha = found.rows, solved.weights.alpha
         short = np.maximum(np.nan_to_num(-judged.margin), judged.tied)
         violated = np.flatnonzero(short > judged.tolerance)
+        loss = judged.loss
         return FeatureCertificate(
-            expert_optimal=not violated.size,
+            expert_optimal=not violated.size if loss is None else loss.optimal,
+            loss_low=None if loss is None else loss.low,
+            loss_bound=None if loss is None else loss.high,
+            loss_share=None if loss is None else loss.share,
             worst_violation=float(np.maximum(short, 0.0).max(initial=0.0)),
             margin=judged.margin,
             violated=violated,

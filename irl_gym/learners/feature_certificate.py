@@ -11,19 +11,29 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
-from irl_gym.certificate import OPTIMAL_WITHIN
-from irl_gym.dynamic_programming import Discounted
+from irl_gym.comparisons import compare
+from irl_gym.dynamic_programming import optimum
+from irl_gym.margins import least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import Loss, loss_of, told_loss
 from irl_gym.policies import as_distribution
 from irl_gym.proven import Proven
+from irl_gym.rewards import TabularReward
 
 
 @dataclass(frozen=True, eq=False)
 class FeatureCertificate(Proven):
     """What a reward alpha . phi proves."""
 
-    expert_optimal: bool
-    """Is the expert optimal under R in every state judged? (4) holds, to rounding, or to two standard errors."""
+    expert_optimal: bool | None
+    """Is the expert optimal under R? On a table by `loss_bound`, None where that is undecided; of a generative model, does (10)
+    hold in all of S_0, to two standard errors?"""
+    loss_low: float | None
+    """The best policy earns at least this more than the expert from d0 under R, rounding included; None without a table."""
+    loss_bound: float | None
+    """And at most this: in unknown states that the expert may reach, over all that it may do there."""
+    loss_share: float | None
+    """`loss_bound` as a share of what is at stake (`optimality`); NaN where every action is tied."""
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     margin: np.ndarray
@@ -64,17 +74,24 @@ class FeatureCertificate(Proven):
         """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
         return self.zero or self.indifferent
 
+    @property
+    def _optimal(self) -> str:
+        if self.loss_low is None or self.loss_bound is None:
+            return "yes, to two standard errors in S_0" if self.expert_optimal else "no, (10) is violated in S_0"
+        return told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share)
+
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
         finite = self.margin[np.isfinite(self.margin)]
-        no = f"no, (4) is violated in {self.violated.size} of {finite.size} states, by {self.worst_violation:.2e} at most"
         lines = [
-            f"expert optimal under R   {'yes' if self.expert_optimal else no}",
+            f"expert optimal under R   {self._optimal}",
             f"margins                  {finite.min():.3g} to {finite.max():.3g} in {finite.size} states",
             self.optimality,
             f"sample                   {self.states} states; {self.trivial} more have no other successors to compare",
             f"features                 {self.n_features}; the rows have rank {self.rank}",
         ]
+        if self.violated.size:
+            lines.append(f"violated                 (4) in {self.violated.size} states, by at most {self.worst_violation:.2e}")
         if not self.expressible:
             lines.append("expressible              no reward in the span of the features makes the expert optimal")
         if self.degenerate:
@@ -96,19 +113,21 @@ class Judged:
     """A violation below this is none; one number, or one for each state."""
     indifferent: bool
     """Is the expert tied with every action in every state judged?"""
+    loss: Loss | None
+    """What the best policy earns more; None where there is no table."""
 
 
-def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, discounted: Discounted) -> Judged:
-    """Margins (S,) under R (S,) of every reachable state in which the expert is known, by one solve and one product."""
-    distribution = as_distribution(expert, mdp.n_states, mdp.n_actions)
-    V = discounted.solve(R)
-    onwards = (mdp.P @ V).reshape(mdp.n_states, mdp.n_actions)
-    advantage = (distribution * onwards).sum(axis=1, keepdims=True) - onwards
-    taken = distribution > 0
-    judged = mdp.reachable & ~mdp.terminal & known
-    margin = np.where(taken, np.inf, advantage).min(axis=1)
-    scale = float(np.abs(R).max(initial=0.0))
-    tolerance = OPTIMAL_WITHIN * scale * (1 + 0.1 / (1 - mdp.gamma))
-    margin[~judged | ~np.isfinite(margin)] = np.nan
-    tied = np.where(judged, np.where(taken, np.abs(advantage), 0.0).max(axis=1), 0.0)
-    return Judged(margin, tied, tolerance, bool(np.abs(advantage[judged]).max(initial=0.0) <= tolerance))
+def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: TabularReward) -> Judged:
+    """Margins (S,) under a reward (S,) of every reachable state in which the expert is known."""
+    rows = np.flatnonzero(mdp.reachable)
+    part, distribution = mdp.restrict(rows), as_distribution(expert, mdp.n_states, mdp.n_actions)[rows]
+    found, seen = optimum(part, reward.of_rows(rows)), known[rows] | part.terminal
+    c = compare(part, distribution, np.flatnonzero(seen))
+    margins = margins_of(found, c)
+    per_state = np.full((3, mdp.n_states), np.nan)
+    per_state[0, rows] = least_per_state(margins.values[~c.equal], c.states[~c.equal], part.n_states)
+    per_state[1, rows] = -least_per_state(-np.abs(margins.values[c.equal]), c.states[c.equal], part.n_states)
+    per_state[2, rows] = -least_per_state(-margins.none, c.states, part.n_states)
+    margin, tied, none = per_state
+    indifferent = bool((np.abs(margins.values) <= margins.none).all())
+    return Judged(margin, np.nan_to_num(tied), np.nan_to_num(none), indifferent, loss_of(found, distribution, ~seen))

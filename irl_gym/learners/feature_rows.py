@@ -14,7 +14,7 @@ import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.comparisons import Comparisons, compare
-from irl_gym.dynamic_programming import Discounted
+from irl_gym.discounted import Discounted
 from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, over_rows
 from irl_gym.generative import GenerativeModel

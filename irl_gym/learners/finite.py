@@ -30,7 +30,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym.certificate import Certificate, certify, row_margins
+from irl_gym.certificate import Certificate, certify
 from irl_gym.checks import checked_number, float_array
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
@@ -40,6 +40,7 @@ from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.partial import PartialTask
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved, Solving
 from irl_gym.learners.strict_rows import strict_rows
+from irl_gym.margins import row_margins
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import SolverName, Status, check_solving
@@ -275,7 +276,7 @@ class _Task:
         values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R
-        reward = TabularReward(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
+        reward = TabularReward.learned(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
         terms = {"r_max": self.learner.r_max, "counted": self.counted, "unbreakable": self.unbreakable}
         certificate = certify(self.mdp, self.expert, reward, **terms, **proof)
         status = Status.ZERO if certificate.zero else solved.answer.status

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from irl_gym.certificate import Certificate, least_per_state
+from irl_gym.certificate import Certificate
 from irl_gym.comparisons import compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverInfeasible
 from irl_gym.learners.base import IRLResult
@@ -21,6 +21,7 @@ from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Solv
 from irl_gym.learners.soft import Found, PartlyKnown, SoftProgram
 from irl_gym.learners.soft_certificate import Terms, certify_partly
 from irl_gym.learners.strict_rows import strict_rows
+from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import Status
@@ -240,7 +241,7 @@ class PartialTask:
         if np.abs(found.R).max() * unit > NO_MARGIN * learner.r_max:
             values[self.rows] = np.clip(found.R * unit, -learner.r_max, learner.r_max)
         note = {"learner": "FiniteLP", "reward_on": learner.reward_on, "unvisited": learner.unvisited}
-        reward = TabularReward(values, note)
+        reward = TabularReward.learned(values, note)
         certificate = certify_partly(
             self.mdp, self.partly, self.rows, reward, terms, bound=bound, lambda_0=lambda_0, visits=self.visits
         )

@@ -3,7 +3,8 @@
 V is the value of acting best under R, everywhere in the reachable part (policy iteration, to rounding), so the margin of a row
 of (4) is what the expert's action is worth more than another in truth, whatever is done where the expert is not known:
     margin(s, a) = Q(s, pi) - Q(s, a), of (P_pi(s) - P_a(s)) V for rewards on states
-`expert_optimal` is judged where the expert is known. The bound is weak duality's (`linear_program`), valid for any multipliers.
+`loss_bound` is over all that the expert may do in unknown states that it may reach. The dual bound is weak duality's
+(`linear_program`), valid for any multipliers.
 Axes: S states, A actions, n rows of (4).
 """
 
@@ -12,9 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from irl_gym._typing import Vector
-from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout
-from irl_gym.dynamic_programming import backup, policy_iteration
+from irl_gym.certificate import Certificate, judged
+from irl_gym.dynamic_programming import optimum
+from irl_gym.howard import Optimum
 from irl_gym.learners.soft import PartlyKnown
+from irl_gym.margins import Margins, best_margins, comparable, least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 
@@ -37,8 +40,10 @@ class Terms:
 class Judged:
     """What a reward does to each row, under the best continuation."""
 
-    margins: np.ndarray
-    """(n,)."""
+    found: Optimum
+    """The best continuation."""
+    margins: Margins
+    """Of each row."""
     price: float
     """N, what l1 prices."""
 
@@ -46,27 +51,23 @@ class Judged:
 def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
     """The rows of (4) under a reward on the reachable part."""
     mdp, c = partly.mdp, partly.comparisons
-    steps = R.expected(mdp)
-    Q = policy_iteration(mdp, steps, tolerance=0.0).Q
-    Q = backup(mdp, steps, Q.max(axis=1))
-    mine = (c.distribution * Q).sum(axis=1)
-    margins = mine[c.states] - Q[c.states, c.actions]
-    loss = np.where(mdp.terminal, 0.0, Q.max(axis=1) - mine)
+    found = optimum(mdp, R)
+    gap = np.maximum(-found.advantages.values.astype(np.float64), 0.0)
+    loss = np.where(mdp.terminal, 0.0, (c.distribution * gap).sum(axis=1))
     count = 1 if R.on_states else mdp.n_actions
     here = R.values if R.on_states else np.where(partly.unknown, R.values[:, 0], 0.0)
-    above = here + (mdp.gamma * loss if R.on_states else _spread(partly, R))  # r_pi
+    above = here + (mdp.gamma * loss if R.on_states else _spread(partly, found))  # r_pi
     parts = np.maximum(above, 0.0) + np.maximum(-here, 0.0)
     price = count * float(np.where(partly.avoided, above + r_max, parts).sum())
     if not R.on_states:
         price += float(np.abs(R.values[partly.known]).sum())
-    return Judged(margins, price)
+    return Judged(found, best_margins(found, c), price)
 
 
-def _spread(partly: PartlyKnown, R: TabularReward) -> Vector:
+def _spread(partly: PartlyKnown, found: Optimum) -> Vector:
     """(S,) how much r_pi is above R in unknown states, for a reward on steps: what random actions lose there."""
     mdp = partly.mdp
-    V = policy_iteration(mdp, R.expected(mdp), tolerance=0.0).Q.max(axis=1)
-    following = (mdp.P @ V).reshape(mdp.n_states, mdp.n_actions)
+    following = (mdp.P @ found.W.values).reshape(mdp.n_states, mdp.n_actions)
     return np.where(partly.unknown, mdp.gamma * (following.max(axis=1) - following.mean(axis=1)), 0.0)
 
 
@@ -77,7 +78,7 @@ def objective(partly: PartlyKnown, found: Judged, terms: Terms) -> float:
     """
     c, others = partly.comparisons, partly.active & ~terms.counted
     margin, other = (
-        np.nan_to_num(least_per_state(found.margins[rows], c.states[rows], partly.mdp.n_states))
+        np.nan_to_num(least_per_state(found.margins.values[rows], c.states[rows], partly.mdp.n_states))
         for rows in (terms.counted, others)
     )
     gains = np.clip(margin, 0.0, np.inf if terms.cap is None else terms.cap)
@@ -108,11 +109,10 @@ def certify_partly(
         lambda_0: reported as given.
         visits: (S,) how often each state was visited; None when that is not known.
     """
-    part, c = partly.mdp, partly.comparisons
-    R = TabularReward(reward.values[rows])
+    c = partly.comparisons
+    R = reward.of_rows(rows)
     found = judge(partly, R, terms.r_max)
     usable = comparable(c, R)
-    short = np.where(partly.active, np.maximum(-found.margins, 0.0), 0.0)
     return Certificate(
         objective=objective(partly, found, terms),
         dual_bound=bound,
@@ -123,6 +123,7 @@ def certify_partly(
         unconstrained=rows[np.setdiff1d(np.flatnonzero(partly.known), c.states[usable])],
         slack=None if terms.slack is None else float(terms.slack),
         unknown=rows[partly.unknown],
-        **judged(mdp, part, rows, c, R, found.margins, short, terms.r_max, terms.unbreakable, visits),
-        indifferent=tied_throughout(found.margins[partly.active], R, part),
+        **judged(
+            mdp, rows, found.found, c, R, found.margins, terms.r_max, terms.unbreakable, partly.active, partly.unknown, visits
+        ),
     )

@@ -17,7 +17,7 @@ from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
 from irl_gym.page.pooled import over_seeds
-from irl_gym.page.proof import ROUNDING, finding
+from irl_gym.page.proof import ROUNDING, answer, finding
 from irl_gym.page.ranked import learning, sentence
 from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
@@ -120,7 +120,7 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
     for name, key in compared.DISTANCES.items():
         if reward.get(key) is not None:
             yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
-    yield "expert optimal under the reward", "yes" if reward["expert_optimal"] else "no"
+    yield "expert optimal under the reward", answer(reward["expert_optimal"])
     if told["retrained"]["score"] is not None:
         steps = run.metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.diagnoses.spoken import usable_flags, with_names
+from irl_gym.optimality import told_record
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -27,7 +28,7 @@ def verdict(run: Run) -> dict[str, Any]:
     """The sentence at the top and three figures, each with whether it is good."""
     agent, reward = run.metrics["policies"]["retrained"], run.metrics["reward"]
     score, share = agent.get("score"), reward.get("worst_tie_regret_share")
-    optimal = bool(reward.get("expert_optimal"))
+    optimal = reward.get("expert_optimal")
     figures = [
         {
             "label": "score of the retrained agent",
@@ -43,12 +44,17 @@ def verdict(run: Run) -> dict[str, Any]:
         },
         {
             "label": "expert optimal under the reward",
-            "value": "yes" if optimal else "no",
+            "value": answer(optimal),
             "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
-            "mood": "good" if optimal and not reward.get("degenerate") else "bad",
+            "mood": "bad" if optimal is False or reward.get("degenerate") else "good" if optimal else "plain",
         },
     ]
     return {"sentence": _sentence(run, score, share, optimal), "figures": figures}
+
+
+def answer(optimal: bool | None) -> str:
+    """Yes, no or undecided."""
+    return "undecided" if optimal is None else "yes" if optimal else "no"
 
 
 def _no_score(run: Run) -> str:
@@ -65,7 +71,7 @@ def _proved(reward: Mapping[str, Any]) -> str:
     return f"the program's optimum is at most {number(gap, 2)} away"
 
 
-def _sentence(run: Run, score: float | None, share: float | None, optimal: bool) -> str:
+def _sentence(run: Run, score: float | None, share: float | None, optimal: bool | None) -> str:
     agent = run.metrics["policies"]["retrained"]
     earned = (
         f"The agent that saw only the recovered reward has a score of {score_of(score)}: random actions are 0, the expert is 1"
@@ -81,7 +87,9 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool)
         if share > 1e-9
         else "; every policy that is best under that reward is as good as the expert"
     )
-    certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it everywhere"
+    certified = "whether the expert is optimal under it is undecided"
+    if optimal is not None:
+        certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
     return f"{earned}{tie}; {certified}."
 
 
@@ -99,7 +107,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     """Terms and what they are, for whichever learner's certificate it is."""
     reward, held = run.metrics["reward"], run.certificate
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
-    yield "Expert optimal under the reward", "yes" if reward["expert_optimal"] else _why_not(reward)
+    optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
+    yield "Expert optimal under the reward", optimal
     if held.get("degenerate"):
         yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)

@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
-from irl_gym.dynamic_programming import backup, evaluate_policy, policy_iteration, tied
+from irl_gym.dynamic_programming import evaluate_policy, optimum
 from irl_gym.evaluation import good_actions
+from irl_gym.howard import Optimum
 from irl_gym.mdp import TabularMDP
-from irl_gym.metrics import tie_tolerance
+from irl_gym.metrics import ties_of
 from irl_gym.page.maps import Map
 from irl_gym.page.written import state_called
 from irl_gym.policies import as_distribution
@@ -81,26 +82,20 @@ class Scene:
         return as_distribution(np.full((n_states, n_actions), 1 / n_actions) if policy is None else policy, n_states, n_actions)
 
     @cached_property
-    def best(self) -> tuple[Vector, Matrix]:
-        """V and Q of the best policy under the true reward: the expert's, where it is that, which costs one evaluation."""
-        reward = self.table.reward.expected(self.mdp)
-        V = evaluate_policy(self.mdp, reward, self.expert)
-        Q = backup(self.mdp, reward, V)
-        if (np.abs(Q.max(axis=1) - V) <= 1e-10 * max(float(np.abs(V).max()), 1e-300)).all():
-            return V, Q
-        solution = policy_iteration(self.mdp, self.table.reward)
-        return solution.V, solution.Q
+    def best(self) -> Optimum:
+        """The best policy under the true reward."""
+        return optimum(self.mdp, self.table.reward)
 
     @cached_property
     def optimal(self) -> ActionSets:
         """(S, A) the actions that are optimal under the true reward."""
-        return tied(self.best[1], tie_tolerance(self.mdp, self.table.reward))
+        return ties_of(self.best, 0.0).possible
 
     @cached_property
     def good(self) -> ActionSets:
         """(S, A) the actions that the agreement of metrics.json counts: the optimal ones, or a poor expert's own."""
         errs = self.run.metrics.get("demonstrations", {}).get("episodes_only", False)
-        return good_actions(self.mdp, self.table.reward, None if errs else self.run.expert, self.best[1])
+        return good_actions(self.mdp, None if errs else self.run.expert, self.best)
 
     @cached_property
     def deviates(self) -> StateMask:
@@ -110,13 +105,13 @@ class Scene:
     @cached_property
     def lost(self) -> Vector:
         """(S,) what the agent's likeliest action loses there, if all later ones are optimal, under the true reward."""
-        V, Q = self.best
-        return np.where(self.acting, V - Q[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)], 0.0)
+        gains = self.best.advantages.values.astype(np.float64)
+        return np.where(self.acting, -gains[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)], 0.0)
 
     @cached_property
     def behind(self) -> Vector:
         """(S,) what the agent loses from there on against acting best, under the true reward."""
-        return np.where(self.acting, self.best[0] - evaluate_policy(self.mdp, self.table.reward, self.agent), 0.0)
+        return np.where(self.acting, self.best.behind(self.agent)[0], 0.0)
 
     def value(self, reward: TabularReward, policy: Matrix) -> Vector:
         """(S,) a policy's value; NaN in states that are not judged."""

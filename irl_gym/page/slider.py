@@ -15,8 +15,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import ActionSets, StateMask
-from irl_gym.dynamic_programming import Discounted, backup, tied
-from irl_gym.metrics import optimal_actions, tie_tolerance
+from irl_gym.discounted import Discounted
+from irl_gym.dynamic_programming import backup, tied
+from irl_gym.metrics import optimal_actions
 from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, axis, blank, plotted, telling
 from irl_gym.page.scene import Scene
@@ -147,8 +148,8 @@ def greedy_sets(scene: Scene, rewards: np.ndarray) -> list[ActionSets]:
     factor = Discounted(sp.csr_array(mdp.mixing(expert) @ mdp.P), mdp.gamma)
     found = []
     for values in rewards:
-        reward = TabularReward(values)
-        R, tolerance = reward.expected(mdp), tie_tolerance(mdp, reward)
+        reward = TabularReward.learned(values, {})
+        R, tolerance = reward.expected(mdp), reward.tolerance
         V = factor.solve((expert * R).sum(axis=1))
         Q = backup(mdp, R, V)
         optimal = (Q.max(axis=1) <= V + tolerance + 1e-12)[~mdp.terminal].all()

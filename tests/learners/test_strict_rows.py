@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from irl_gym.certificate import row_margins
 from irl_gym.comparisons import compare
 from irl_gym.diagnosis import doctor
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.margins import row_margins
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import worst_tie
 from irl_gym.rewards import TabularReward

@@ -50,7 +50,7 @@ def test_an_expert_that_errs_or_is_known_by_data_is_no_judge(run):
 def test_what_a_state_loses_is_0_where_the_agent_acts_best(run):
     scene = scene_of(replace(run, agent=run.expert))
     np.testing.assert_allclose(scene.lost, 0, atol=1e-12)
-    assert float(scene.mdp.d0 @ scene.best[0]) == pytest.approx(policy_value(scene.mdp, scene.table.reward, run.expert))
+    assert float(scene.mdp.d0 @ scene.best.V) == pytest.approx(policy_value(scene.mdp, scene.table.reward, run.expert))
 
 
 def test_widths_of_steps_are_those_of_the_expert_s_step(run):

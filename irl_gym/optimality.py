@@ -1,0 +1,119 @@
+"""Is an expert optimal under a reward? Decided by the value at stake, from the start, with all rounding.
+
+    loss = d0 . (V* - V_pi)                what the best policy earns more than the expert
+    scale = min(d0 . (V* - V_random), span of V* over the states that the expert or an optimal policy visits)
+The expert is optimal where the loss is at most `OPTIMAL_SHARE` of the scale: yes, no, or undecided where the bounds of both do
+not settle it. The smaller of the two scales counts, so that an outlier of R which only bad actions reach, or only a gamble,
+does not dilute a loss. Where V* is flat over those states, to float64 or to what the solver of R left open, their largest |V*|
+takes the place of its span; where every action everywhere is tied there is no scale, and nothing to lose.
+Axes: S states, A actions.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym._typing import Matrix, StateMask
+from irl_gym.discounted import EPSILON
+from irl_gym.howard import OUTWARDS, Optimum
+from irl_gym.mdp import TransitionTable
+
+OPTIMAL_SHARE = 1e-6
+"""Share of the scale that an optimal expert may lose."""
+FLAT = 64 * EPSILON
+"""Share of |V*| below which its span is rounding."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What the best policy earns more than an expert, from d0 and discounted: bounds that hold with all rounding."""
+
+    low: float
+    """At least this."""
+    high: float
+    """At most this."""
+    scale_low: float
+    """What is at stake, at least; 0 where every action is tied."""
+    scale_high: float
+    """And at most."""
+    tied: bool
+    """Is every action tied in every state that is not terminal?"""
+
+    @property
+    def optimal(self) -> bool | None:
+        """Is the expert optimal? None where the bounds leave it undecided."""
+        if self.tied or self.high <= OPTIMAL_SHARE * self.scale_low:
+            return True
+        return False if self.low > OPTIMAL_SHARE * self.scale_high else None
+
+    @property
+    def share(self) -> float:
+        """The loss as a share of the scale, at most; NaN where there is no scale."""
+        return float("nan") if self.tied or not self.scale_low > 0 else self.high / self.scale_low
+
+    def __str__(self) -> str:
+        return told_loss(self.optimal, self.low, self.high, self.share)
+
+
+def told_loss(optimal: bool | None, low: float, high: float | None, share: float | None) -> str:
+    """Is the expert optimal, and what the best policy earns more, in a sentence; None and infinity where it is not known."""
+    part = "" if share is None or not np.isfinite(share) else f", {share:.2g} of what is at stake,"
+    known = high is not None and np.isfinite(high)
+    if optimal:
+        return f"yes: no policy earns more by over {high:.2g}{part}".rstrip(",") if part else "yes: all actions are tied"
+    if optimal is None:
+        most = f"by {low:.3g} to {high:.3g}" if known else f"by at least {low:.3g}, how much is not known"
+        return f"undecided: the best policy earns more {most}"
+    return f"no: the best policy earns more by at least {low:.3g}"
+
+
+def told_record(record: Mapping[str, Any]) -> str | None:
+    """The same of a certificate that json held, with the rows that are violated; None where it is not judged by a loss."""
+    if record.get("loss_low") is None:
+        return None
+    told = told_loss(record["expert_optimal"], record["loss_low"], record.get("loss_bound"), record.get("loss_share"))
+    count = record.get("violated_states")
+    where = "1 state" if count == 1 else f"{count} states"
+    return f"{told}; (4) is violated in {where}, by at most {record['worst_violation']:.3g}" if count else told
+
+
+def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:
+    """What an expert loses against the best policy.
+
+    Args:
+        found: the optimum of a table whose states can all be reached, under the reward.
+        expert: (S, A) probabilities.
+        unknown: (S,) states in which the expert may do anything: the bounds are over all that it may do there.
+    """
+    mdp, e = found.table.mdp, found.error
+    nowhere = np.zeros(mdp.n_states, dtype=bool)
+    below, above = found.shortfall(expert, nowhere if unknown is None else unknown)
+    low, high = _sum(mdp.d0, below - e, -1), _sum(mdp.d0, above + found.above, 1)
+    random = found.shortfall(np.full(expert.shape, 1 / expert.shape[1]), nowhere)
+    gain = max(_sum(mdp.d0, random[0] - e, -1), 0.0), _sum(mdp.d0, random[1] + found.above, 1)
+    visited = _visited(found, expert)
+    h, unsure = found.W.differences[visited], e[visited].astype(np.longdouble)
+    span = float((h - unsure).max() - (h + unsure).min()) * (1 - OUTWARDS), float((h + unsure).max() - (h - unsure).min())
+    largest = float(np.abs(h + np.longdouble(found.W.constant)).max())
+    if span[1] <= max(FLAT * largest, found.table.reward.tolerance * found.table.horizon):
+        span = largest * (1 - OUTWARDS) - float(unsure.max()), largest * (1 + OUTWARDS) + float(unsure.max())
+    tied = bool(found.tied()[~mdp.terminal].all())
+    scale = min(gain[0], max(span[0], 0.0)), min(gain[1], span[1] * (1 + OUTWARDS))
+    return Loss(max(low, 0.0), max(high, 0.0), *scale, tied)
+
+
+def _visited(found: Optimum, expert: Matrix) -> StateMask:
+    """(S,) the states that the expert or an optimal policy visits: one that does what the expert does, where that is tied."""
+    mdp = found.table.mdp
+    like = (found.tied() | (expert == 0)).all(axis=1)
+    optimal = np.where(like[:, None], expert, np.eye(mdp.n_actions)[found.policy])
+    one, other = (TransitionTable(mdp.P_pi(policy), mdp.d0).reachable for policy in (expert, optimal))
+    return one | other
+
+
+def _sum(d0: np.ndarray, values: np.ndarray, side: int) -> float:
+    """d0 . values, rounded to one side."""
+    where = d0 > 0
+    return float(d0[where] @ values[where] + side * OUTWARDS * (d0[where] @ np.abs(values[where])))

@@ -93,7 +93,7 @@ class Certificate(Proven):
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
         finite = self.margin[np.isfinite(self.margin)]
-        optimal = told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share)
+        optimal = told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share, self.unknown.size)
         span = f"{finite.min():.3g} to {finite.max():.3g} in {finite.size} states" if finite.size else "none"
         lines = [
             f"expert optimal under R   {optimal}",

@@ -57,15 +57,20 @@ class Loss:
         return told_loss(self.optimal, self.low, self.high, self.share)
 
 
-def told_loss(optimal: bool | None, low: float, high: float | None, share: float | None) -> str:
-    """Is the expert optimal, and what the best policy earns more, in a sentence; None and infinity where it is not known."""
+def told_loss(optimal: bool | None, low: float, high: float | None, share: float | None, unknown: int = 0) -> str:
+    """Is the expert optimal, and what the best policy earns more, in a sentence; None and infinity where it is not known.
+
+    `unknown` is the number of states in which the expert may do anything.
+    """
     part = "" if share is None or not np.isfinite(share) else f", {share:.2g} of what is at stake,"
     known = high is not None and np.isfinite(high)
     if optimal:
         return f"yes: no policy earns more by over {high:.2g}{part}".rstrip(",") if part else "yes: all actions are tied"
     if optimal is None:
         most = f"by {low:.3g} to {high:.3g}" if known else f"by at least {low:.3g}, how much is not known"
-        return f"undecided: the best policy earns more {most}"
+        where = "1 state where it was" if unknown == 1 else f"{unknown} states where it was"
+        by = f", by what the expert does in {where} not seen" if unknown else ""
+        return f"undecided: the best policy earns more {most}{by}"
     return f"no: the best policy earns more by at least {low:.3g}"
 
 
@@ -73,7 +78,8 @@ def told_record(record: Mapping[str, Any]) -> str | None:
     """The same of a certificate that json held, with the rows that are violated; None where it is not judged by a loss."""
     if record.get("loss_low") is None:
         return None
-    told = told_loss(record["expert_optimal"], record["loss_low"], record.get("loss_bound"), record.get("loss_share"))
+    bounds = record["loss_low"], record.get("loss_bound"), record.get("loss_share")
+    told = told_loss(record["expert_optimal"], *bounds, record.get("unknown_states") or 0)
     count = record.get("violated_states")
     where = "1 state" if count == 1 else f"{count} states"
     return f"{told}; (4) is violated in {where}, by at most {record['worst_violation']:.3g}" if count else told

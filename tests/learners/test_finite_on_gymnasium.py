@@ -1,10 +1,11 @@
 """The default learner on Gymnasium's tables: no tie is left that leads a learner astray (references.md, section 1)."""
 
+import numpy as np
 import pytest
 
 from irl_gym.dynamic_programming import value_iteration
 from irl_gym.learners.finite import FiniteLP
-from irl_gym.metrics import policy_value, random_value, worst_tie
+from irl_gym.metrics import policy_value, random_value, tie_aware_agreement, ties, worst_tie
 
 EXPERT_VALUES = {
     "FrozenLake 4x4 slippery": 0.542,
@@ -41,6 +42,16 @@ def test_finite_lp_worst_tie_loses_at_most_one_percent(toy_text, name):
 
 def test_finite_lp_on_steps_loses_at_most_one_percent_on_the_slippery_cliff(toy_text):
     assert lost(toy_text("CliffWalking slippery"), FiniteLP(reward_on="state-action")) <= 0.01
+
+
+def test_what_a_solver_left_open_counts_as_tied(toy_text):
+    table = toy_text("Taxi")
+    learned = FiniteLP(margin_cap=None).fit(table.mdp, plan(table)).reward
+    assert worst_tie(table.mdp, learned, table.reward).value == pytest.approx(-912.35, abs=0.01)
+    assert worst_tie(table.mdp, learned, table.reward, tolerance=1e-12).value == pytest.approx(6.327, abs=0.001)
+    others = ~np.eye(6, dtype=bool)[plan(table)]
+    agreed = tie_aware_agreement(table.mdp, learned, others)
+    assert ties(table.mdp, learned).undecided.sum() > 100 and 0 < agreed.undecided <= agreed.share
 
 
 @pytest.mark.parametrize(("reward_on", "value"), [("state", -143.4), ("state-action", -46.35)])

@@ -23,10 +23,12 @@ class Discounted:
     Args:
         P_pi: (S, S) transitions under a policy.
         gamma: discount.
+        sums: rounded operations that the entries of P_pi are the result of; the bounds allow for them.
     """
 
-    def __init__(self, P_pi: Sparse, gamma: float):
+    def __init__(self, P_pi: Sparse, gamma: float, *, sums: int = 0):
         self._P = sp.csr_array(gamma * P_pi)
+        self._terms = (int(np.diff(self._P.indptr).max(initial=0)) + 8 + sums) * EPSILON
         identity = sp.eye_array(P_pi.shape[0], format="csc")
         # Its diagonal dominates each row, so no pivots are sought; that order halves the factors of SuperLU's default.
         self._factor = splu(
@@ -56,7 +58,6 @@ class Discounted:
 
     def _moved(self, right: Vector, share: float) -> tuple[Vector, Vector]:
         """A solution moved up or down, and the rounding (S,) of its check."""
-        terms = (int(np.diff(self._P.indptr).max(initial=0)) + 8) * EPSILON
         plain = np.maximum(self.solve(right), 0.0)
-        y = np.maximum(self.solve((1 + share) * right + np.sign(share) * 8 * terms * plain), 0.0)
-        return y, terms * (y + right + self._P @ y)
+        y = np.maximum(self.solve((1 + share) * right + np.sign(share) * 8 * self._terms * plain), 0.0)
+        return y, self._terms * (y + right + self._P @ y)

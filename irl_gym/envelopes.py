@@ -15,7 +15,7 @@ TRIED = 30
 """Improvements of the policy behind a bound, at most."""
 
 
-def most(P: Sparse, gamma: float, gains: Matrix, horizon: float, policy: Actions | None = None) -> Vector:
+def most(P: Sparse, gamma: float, gains: Matrix, horizon: float, policy: Actions | None = None, *, sums: int = 0) -> Vector:
     """(S,) at least what any policy adds up to.
 
     Args:
@@ -24,12 +24,14 @@ def most(P: Sparse, gamma: float, gains: Matrix, horizon: float, policy: Actions
         gains: (S, A) what an action gives, rounded upwards; -infinity where it is not allowed.
         horizon: discounted steps at most.
         policy: (S,) tried first; None for the actions that give most.
+        sums: rounded operations that the entries of P are the result of.
     """
-    rows, terms = np.arange(gains.shape[0]), _terms(P)
+    rows, terms = np.arange(gains.shape[0]), _terms(P, sums)
     chosen: np.ndarray = np.argmax(gains, axis=1) if policy is None else policy
     y = lacking = np.zeros(gains.shape[0])
     for _ in range(TRIED):
-        y = Discounted(P[rows * gains.shape[1] + chosen], gamma).above(np.maximum(gains[rows, chosen], 0.0))
+        discounted = Discounted(P[rows * gains.shape[1] + chosen], gamma, sums=sums)
+        y = discounted.above(np.maximum(gains[rows, chosen], 0.0))
         onwards = gamma * (P @ y).reshape(gains.shape)
         needed = (gains + onwards * (1 + terms)).max(axis=1) * (1 + 4 * EPSILON)
         lacking = needed - y
@@ -39,12 +41,12 @@ def most(P: Sparse, gamma: float, gains: Matrix, horizon: float, policy: Actions
     return y + np.full(y.shape, float(lacking.max()) * horizon)
 
 
-def least(P: Sparse, gamma: float, gains: Matrix) -> Vector:
+def least(P: Sparse, gamma: float, gains: Matrix, *, sums: int = 0) -> Vector:
     """(S,) at most what any policy adds up to, -infinity where nothing is proved; `gains` (S, A) are rounded downwards."""
-    rows, terms = np.arange(gains.shape[0]), _terms(P)
+    rows, terms = np.arange(gains.shape[0]), _terms(P, sums)
     policy = gains.argmin(axis=1)
     for _ in range(TRIED):
-        discounted, given = Discounted(P[rows * gains.shape[1] + policy], gamma), gains[rows, policy]
+        discounted, given = Discounted(P[rows * gains.shape[1] + policy], gamma, sums=sums), gains[rows, policy]
         y = discounted.below(np.maximum(given, 0.0)) - discounted.above(np.maximum(-given, 0.0))
         if not np.isfinite(y).all():
             break
@@ -57,6 +59,6 @@ def least(P: Sparse, gamma: float, gains: Matrix) -> Vector:
     return np.full(gains.shape[0], -np.inf)
 
 
-def _terms(P: Sparse) -> float:
+def _terms(P: Sparse, sums: int) -> float:
     """The relative rounding of a product with P."""
-    return (int(np.diff(P.indptr).max(initial=0)) + 12) * EPSILON
+    return (int(np.diff(P.indptr).max(initial=0)) + 12 + sums) * EPSILON

@@ -10,6 +10,7 @@ import numpy as np
 from irl_gym import metrics
 from irl_gym._typing import ActionSets
 from irl_gym.curves import Curve, read_curve, two_returns
+from irl_gym.discounted import EPSILON
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import NotTabular, UndefinedDistance
@@ -77,14 +78,14 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
 
 def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
     """What a score is measured by; earned are the discounted returns (N,) of episodes that were given."""
-    world, rounding = loop.world, 0.0
-    if isinstance(world, TableWorld):
-        rounding = 1e-6 * world.table.reward.largest(world.table.mdp)
+    world, told = loop.world, from_data(loop)
     random = world.value(world.random)
-    if not from_data(loop):
-        return Scale(random, world.value(loop.expert), rounding, gamma=world.gamma)
-    half = half_width(earned, _without_chance(loop))
-    return Scale(random, float(earned.mean()), rounding, half, earned.size, world.gamma)
+    expert = float(earned.mean()) if told else world.value(loop.expert)
+    # What a factorisation of I - gamma P leaves of values, its condition number being about 1 / (1 - gamma).
+    rounding = 64 * EPSILON / (1 - world.gamma) * max(abs(random), abs(expert)) if isinstance(world, TableWorld) else 0.0
+    if not told:
+        return Scale(random, expert, rounding, gamma=world.gamma)
+    return Scale(random, expert, rounding, half_width(earned, _without_chance(loop)), earned.size, world.gamma)
 
 
 def _without_chance(loop: "Loop") -> bool:

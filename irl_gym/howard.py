@@ -71,15 +71,13 @@ class Optimum:
         weights = distribution / distribution.sum(axis=1, keepdims=True)
         lost = -(weights * found.values).sum(axis=1)
         unsure = (weights * (found.rounding + (mdp.n_actions + 8) * EPSILON * np.abs(found.values))).sum(axis=1)
-        P_pi = mdp.P_pi(weights)
-        discounted = Discounted(P_pi, mdp.gamma)
+        P_pi, sums = mdp.P_pi(weights), 0 if (weights.max(axis=1) == 1).all() else 2 * mdp.n_actions
+        discounted = Discounted(P_pi, mdp.gamma, sums=sums)
         behind = discounted.solve(lost.astype(np.float64))
         long = behind.astype(LONG)
         off = np.abs(lost + LONG(mdp.gamma) * (P_pi.astype(LONG) @ long) - long).astype(np.float64)
-        mixed = 0.0 if (weights.max(axis=1) == 1).all() else EPSILON  # rows of P_pi that are rounded sums
-        rounding = self.table.terms * (
-            (mixed + EPSILON_LONG) * mdp.gamma * (P_pi @ np.abs(behind)) + EPSILON_LONG * np.abs(behind)
-        )
+        onwards = mdp.gamma * (P_pi @ np.abs(behind))
+        rounding = self.table.terms * EPSILON_LONG * (onwards + np.abs(behind)) + sums * EPSILON * onwards
         return behind, discounted.above((off + rounding + unsure.astype(np.float64)) * (1 + OUTWARDS))
 
     def shortfall(self, distribution: Matrix, free: StateMask) -> tuple[Vector, Vector]:
@@ -101,7 +99,8 @@ class Optimum:
         lost = mixed(-found.values)
         unsure = mixed(found.rounding) * (1 + OUTWARDS) + (mdp.n_actions + 8) * EPSILON * mixed(np.abs(found.values))
         P = as_told(mdp, weights, free)
-        return least(P, mdp.gamma, lost - unsure), most(P, mdp.gamma, lost + unsure, self.table.horizon)
+        low = least(P, mdp.gamma, lost - unsure, sums=2 * mdp.n_actions)
+        return low, most(P, mdp.gamma, lost + unsure, self.table.horizon, sums=2 * mdp.n_actions)
 
     @cached_property
     def error(self) -> Vector:

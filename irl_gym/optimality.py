@@ -62,16 +62,18 @@ def told_loss(optimal: bool | None, low: float, high: float | None, share: float
 
     `unknown` is the number of states in which the expert may do anything.
     """
-    part = "" if share is None or not np.isfinite(share) else f", {share:.2g} of what is at stake,"
     known = high is not None and np.isfinite(high)
+    if optimal and (share is None or not np.isfinite(share)):
+        return "yes: all actions are tied"
     if optimal:
-        return f"yes: no policy earns more by over {high:.2g}{part}".rstrip(",") if part else "yes: all actions are tied"
+        return f"yes: the best policy earns at most {high:.1e} more, {share:.1e} of what is at stake"
     if optimal is None:
-        most = f"by {low:.3g} to {high:.3g}" if known else f"by at least {low:.3g}, how much is not known"
+        most = f"{low:.3g} to {high:.3g} more" if known else f"at least {low:.3g} more, how much is not known"
         where = "1 state where it was" if unknown == 1 else f"{unknown} states where it was"
-        by = f", by what the expert does in {where} not seen" if unknown else ""
-        return f"undecided: the best policy earns more {most}{by}"
-    return f"no: the best policy earns more by at least {low:.3g}"
+        return f"undecided: the best policy earns {most}" + (
+            f", by what the expert does in {where} not seen" if unknown else ""
+        )
+    return f"no: the best policy earns at least {low:.3g} more"
 
 
 def told_record(record: Mapping[str, Any]) -> str | None:

@@ -116,10 +116,10 @@ def test_unknown_states_that_the_expert_cannot_reach_do_not_matter():
 @pytest.mark.parametrize(
     ("bounds", "optimal", "told"),
     [
-        ((0.0, 1e-9, 1.0, 1.1), True, "yes: no policy earns more by over 1e-09, 1e-09 of what is at stake"),
-        ((0.5, 0.6, 1.0, 1.1), False, "no: the best policy earns more by at least 0.5"),
-        ((0.0, 0.6, 1.0, 1.1), None, "undecided: the best policy earns more by 0 to 0.6"),
-        ((0.0, np.inf, 1.0, 1.1), None, "undecided: the best policy earns more by at least 0, how much is not known"),
+        ((0.0, 1e-9, 1.0, 1.1), True, "yes: the best policy earns at most 1.0e-09 more, 1.0e-09 of what is at stake"),
+        ((0.5, 0.6, 1.0, 1.1), False, "no: the best policy earns at least 0.5 more"),
+        ((0.0, 0.6, 1.0, 1.1), None, "undecided: the best policy earns 0 to 0.6 more"),
+        ((0.0, np.inf, 1.0, 1.1), None, "undecided: the best policy earns at least 0 more, how much is not known"),
     ],
 )
 def test_a_loss_is_told_in_a_sentence(bounds, optimal, told):

@@ -113,7 +113,7 @@ class Membership:
         if not finite.size:
             return "The expert is optimal: no row of (4) compares it with an action of other successors."
         tied = f"; in {self.ties} of {finite.size} states another action is as good" if self.ties else ""
-        return f"The expert is optimal, with margins from {max(finite.min(), 0.0):.3g} to {finite.max():.3g}{tied}."
+        return f"The expert is optimal, with margins from {0.0 if self.ties else finite.min():.3g} to {finite.max():.3g}{tied}."
 
     def to_json(self) -> dict[str, Any]:
         """As json holds it: NaN becomes None."""

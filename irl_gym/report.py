@@ -1,5 +1,6 @@
 """A run in a few tables a person reads, for the terminal."""
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -115,10 +116,9 @@ def _of_training(report: Report) -> str:
     table, share = report.metrics["table"], report.metrics["reward"].get("worst_tie_regret_share")
     if judged(report.metrics["policies"], table).mood != "bad" or share is None or share > MUCH or not table["exact"]:
         return ""
-    return (
-        f"\nA policy that is best under the reward has a score of at least {score_of(1 - share)}: try more --total-timesteps, "
-        "or --retrain value-iteration."
-    )
+    least = math.floor(1000 * (1 - share)) / 1000
+    told = f"Every policy that is best under the reward has a score of at least {least:.3f}"
+    return f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
 
 
 OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"

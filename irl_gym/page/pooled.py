@@ -49,8 +49,8 @@ def told(pool: Pool) -> str:
     n = len(pool.runs)
     if pool.score is None:
         return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
-    means = f"score {spoken(pool.score)}, {returned(pool)}, {averaged(pool)} over {n} seeds"
-    return f"{called(pool)}: {means}; {pool.judged.brief}"
+    means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
+    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}"
 
 
 def returned(pool: Pool) -> str:

@@ -78,12 +78,9 @@ def test_runs_of_one_seed_have_no_section(seeds):
 
 def test_a_pool_is_told_in_a_line(seeds):
     (pool,) = pools(lettered(seeds))
-    pattern = (
-        r"runs A, B, C, D: score [0-9.]+ \(.*\), mean return [-0-9.]+ \(.*\) where random actions have .*, the expert .*, "
-    )
-    assert re.match(
-        pattern + r"interquartile mean over 4 seeds; left open \(0.685 of value, 0.685 of mean return\)", told(pool)
-    )
+    whose = "runs A, B, C, D, interquartile mean over 4 seeds: "
+    means = r"score [0-9.]+ \(.*\), mean return [-0-9.]+ \(.*\) where random actions have .*, the expert .*"
+    assert re.fullmatch(whose + means + r"; left open \(0.685 of value, 0.685 of mean return\)", told(pool))
 
 
 def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):

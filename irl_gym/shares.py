@@ -60,9 +60,9 @@ class Judged:
     def told(self) -> str:
         """The judgement in words that follow a colon, and how it was reached."""
         if self.score is None:
-            return f"{self.brief}, as there is no score."
+            return "not at all, as there is no score."
         if self.mood == "plain":
-            return f"{self.brief}, as the score is that of a table which is an estimate, and {self.fault}."
+            return f"not at all, as the score is that of a table which is an estimate, and {self.fault}."
         scale = f"random actions are 0, the expert is 1, and good begins at {GOOD:g}"
         if self.share is None:
             return f"{self.brief}; {scale}. Mean returns do not count: {self.fault}."

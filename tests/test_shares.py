@@ -63,7 +63,7 @@ def test_nothing_is_judged_when_the_table_is_an_estimate_and_the_episodes_are_no
 
 def test_nothing_is_judged_without_a_score():
     found = judge(None, **CART)
-    assert (found.mood, found.told) == ("plain", "not judged, as there is no score.") and found.share == pytest.approx(
+    assert (found.mood, found.told) == ("plain", "not at all, as there is no score.") and found.share == pytest.approx(
         0.843, abs=1e-3
     )
 

@@ -21,6 +21,7 @@ from irl_gym.optimality import loss_of
 from irl_gym.policies import as_distribution, support
 from irl_gym.rewards import TabularReward
 from irl_gym.scores import Scale, half_width
+from irl_gym.shares import GOOD, returns_of, share_of_return
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 JUDGING = 1_000_003
 """Added to the seed of the episodes that judge, the same for all: policies that do the same then earn the same."""
-GOOD, NEARLY_ALL = 0.9, 0.99
-"""Scores that the learning curve is reported to reach for good."""
+NEARLY_ALL = 0.99
+"""A score that the learning curve is reported to reach for good, beside `shares.GOOD`."""
 
 
 def evaluate(loop: "Loop") -> dict[str, Any]:
@@ -58,6 +59,9 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
             if isinstance(world, TableWorld) and agreed is not None and not told
             else None,
         }
+    expert, random = (returns_of(rows[name]) for name in ("expert", "random"))
+    for row in rows.values():
+        row["return_share"] = share_of_return(returns_of(row), expert, random)
     curve = learning_curve(loop)
     points = np.column_stack([curve.steps, curve.value])
     training: dict[str, Any] = {"environment_steps": loop.stage("agent")["environment_steps"]}

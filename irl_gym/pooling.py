@@ -16,6 +16,7 @@ import numpy as np
 
 from irl_gym.intervals import Interval, iqm_interval
 from irl_gym.runs import Run
+from irl_gym.shares import Judged, judge
 
 PLACE = ("env_id", "env_kwargs", "dataset", "dataset_root", "table")
 """Entries of a configuration in which pooled environments may differ."""
@@ -47,10 +48,17 @@ class Pool:
         return None if self.scores is None else over_seeds(self.scores)
 
     @cached_property
-    def mean_return(self) -> Interval:
-        """The interquartile mean of the agents' mean undiscounted returns."""
-        found = [run.metrics["policies"]["retrained"]["mean_return"] for run in self.runs.values()]
-        return over_seeds(np.array(found, dtype=np.float64))
+    def mean_returns(self) -> dict[str, Interval]:
+        """The interquartile means of mean undiscounted returns, by policy: expert, random, retrained."""
+        rows = [run.metrics["policies"] for run in self.runs.values()]
+        return {name: over_seeds(np.array([row[name]["mean_return"] for row in rows], dtype=np.float64)) for name in rows[0]}
+
+    @cached_property
+    def judged(self) -> Judged:
+        """The agents by the worse share of both means."""
+        returns, table = self.mean_returns, self.first.metrics.get("table") or {}
+        means = (returns[name] for name in ("retrained", "expert", "random"))
+        return judge(self.score, *means, estimated=not table.get("exact", True))
 
     @cached_property
     def curve(self) -> tuple[np.ndarray, np.ndarray] | None:

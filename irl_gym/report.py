@@ -1,5 +1,6 @@
 """A run in a few tables a person reads, for the terminal."""
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,13 +15,11 @@ from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
+from irl_gym.scores import score_of
+from irl_gym.shares import MUCH, judged
 
-MUCH = 0.05
-"""Share of the expert's advantage over random; a worst tie that loses more is worth a warning."""
-
-
-ENOUGH = 0.9
-"""Score of an agent that has learned what the reward asks for."""
+COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
+"""Of a score and a mean return, by how both are judged."""
 
 ROUNDING = 1e-12
 """A distance from the best possible up to this is none."""
@@ -81,14 +80,16 @@ def _policies(report: Report) -> Table:
     table.add_column("policy")
     headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
     known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
+    found = judged(report.metrics["policies"], report.metrics["table"])
     for heading in (*headings.values(), *(("agreement",) if known else ())):
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
-        score = "-" if row["score"] is None else f"{row['score']:.3f}"
+        score = "-" if row["score"] is None else score_of(row["score"])
         interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
         whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
-        table.add_row(whose, f"{row['value']:.4f}", score, interval, *agreement)
+        style = COLOURS[found.mood] if name == "retrained" else ""
+        table.add_row(whose, f"{row['value']:.4f}", Text(score, style), Text(interval, style), *agreement)
     given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
     errs = " with its errors" if only and not given else ""
     table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
@@ -99,6 +100,7 @@ def _policies(report: Report) -> Table:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
+    table.caption += f"\njudged: {found.told}"
     table.caption += _of_training(report)
     table.caption_justify = "left"
     return table
@@ -111,11 +113,13 @@ def _shown(report: Report) -> str:
 
 
 def _of_training(report: Report) -> str:
-    """Where the reward is good and the agent is not, what to do."""
-    score, share = report.metrics["policies"]["retrained"]["score"], report.metrics["reward"].get("worst_tie_regret_share")
-    if score is None or share is None or score >= ENOUGH or share > MUCH:
+    """Where every policy that is best under the reward is good, and the agent is not, what to do."""
+    table, share = report.metrics["table"], report.metrics["reward"].get("worst_tie_regret_share")
+    if judged(report.metrics["policies"], table).mood != "bad" or share is None or share > MUCH or not table["exact"]:
         return ""
-    return "\nThe reward is good and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
+    least = math.floor(1000 * (1 - share)) / 1000
+    told = f"Every policy that is best under the reward has a score of at least {least:.3f}"
+    return f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
 
 
 OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"

@@ -84,6 +84,13 @@ class Scale:
         return None if self.reason is not None else lost / (self.expert - self.random)
 
 
+def score_of(score: float | None) -> str:
+    """A score with three decimals, which says 1.000 only of what is 1."""
+    if score is None or not np.isfinite(score):
+        return "none" if score is None else "not known"
+    return "above 0.999" if 0.9995 <= score < 1 - 1e-6 else f"{score:.3f}".replace("-0.000", "0.000")
+
+
 def half_width(returns: Vector, exact: bool) -> float:
     """Half of the 95 % interval of the mean of returns (N,); 0 if they are known to be all that can be, see above."""
     if exact:

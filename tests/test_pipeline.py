@@ -53,7 +53,16 @@ def test_the_retrained_agent_is_as_good_as_the_expert(report):
 
 def test_the_scale_of_the_score_is_set_by_random_and_expert(report):
     policies = report.metrics["policies"]
-    assert (policies["random"]["score"], policies["expert"]["score"]) == (0.0, 1.0)
+    for share in ("score", "return_share"):
+        assert (policies["random"][share], policies["expert"][share]) == (0.0, 1.0)
+
+
+def test_the_share_of_the_mean_return_is_in_the_metrics_and_in_their_csv(report):
+    mean = {name: row["mean_return"] for name, row in report.metrics["policies"].items()}
+    share = (mean["retrained"] - mean["random"]) / (mean["expert"] - mean["random"])
+    assert report.metrics["policies"]["retrained"]["return_share"] == pytest.approx(share)
+    rows = [line.split(",") for line in (report.out / "metrics.csv").read_text().splitlines()]
+    assert [float(row[-1]) for row in rows if row[-3:-1] == ["retrained", "return_share"]] == [pytest.approx(share)]
 
 
 def test_the_distances_of_the_rewards_are_those_where_episodes_go(report):

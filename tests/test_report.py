@@ -15,7 +15,10 @@ from irl_gym.report import print_report
 CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
 
 
-def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, demonstrations=None, **reward):
+def said(
+    out, *, score=1.0, reason=None, share=0.0, config=None, training=None, demonstrations=None, policies=None, coloured=False,
+    **reward,
+):  # fmt: skip
     """What is printed of a run of FiniteLP with these numbers, on one line."""
     row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
     told = {
@@ -26,7 +29,8 @@ def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, 
     } | reward  # fmt: skip
     told = {key: one for key, one in told.items() if key != "violated_states" or one is not None}
     metrics = {
-        "policies": {name: row for name in ("expert", "random", "retrained")}, "score_reason": reason, "reward": told,
+        "policies": {name: row | (policies or {}).get(name, {}) for name in ("expert", "random", "retrained")},
+        "score_reason": reason, "reward": told,
         "training": training or {"environment_steps": 4096, "steps_to_0.9": 64, "steps_to_0.99": 2048}, "table": {
             "horizon": None, "error": 0.0, "exact": True, "reachable": 11, "actions": 4, "method": "Published."},
         "demonstrations": demonstrations or {
@@ -34,7 +38,7 @@ def said(out, *, score=1.0, reason=None, share=0.0, config=None, training=None, 
     }  # fmt: skip
     asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
     stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
-    console = Console(file=io.StringIO(), width=250)
+    console = Console(file=io.StringIO(), width=250, force_terminal=coloured, color_system="standard" if coloured else None)
     print_report(Report(out, metrics, {}, stages, asked | (config or {}), {}), console)
     return " ".join(console.file.getvalue().split())
 
@@ -121,3 +125,30 @@ def test_the_distance_of_the_rewards_is_told_where_it_is_known(tmp_path):
     )
     assert "distance from the true one │ STARC 0.50; 0" in said(tmp_path, starc=0.5, epic=None)
     assert "distance from" not in said(tmp_path)
+
+
+TAXI = {
+    "expert": {"mean_return": 7.8, "return_low": 7.4, "return_high": 8.2},
+    "random": {"mean_return": -770.0, "return_low": -785.0, "return_high": -755.0},
+    "retrained": {"score": 0.82, "mean_return": -139.0, "return_low": -155.0, "return_high": -123.0},
+}
+
+
+def test_the_agent_is_judged_by_the_worse_of_score_and_mean_return(tmp_path):
+    assert "judged: not good (0.820 of value, 0.811 of mean return)." in said(tmp_path, policies=TAXI)
+    lucky = TAXI | {"retrained": TAXI["retrained"] | {"score": 0.99}}
+    assert "judged: not good (0.990 of value, 0.811 of mean return)." in said(tmp_path, policies=lucky)
+
+
+def test_training_more_is_advised_when_the_mean_return_alone_falls_short(tmp_path):
+    lucky = TAXI | {"retrained": TAXI["retrained"] | {"score": 0.99}}
+    text = said(tmp_path, policies=lucky, share=0.01)
+    assert "best under the reward has a score of at least 0.990: try more --total-timesteps" in text
+    assert "try more" not in said(tmp_path, policies=lucky, share=0.2)
+
+
+@pytest.mark.parametrize("score", [0.82, 0.99])
+def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
+    policies = TAXI | {"retrained": TAXI["retrained"] | {"score": score}}
+    text = said(tmp_path, policies=policies, coloured=True)
+    assert f"\x1b[31m{score:.3f}\x1b" in text and "\x1b[31m-139.000 (-155.000 to -123.000)\x1b" in text

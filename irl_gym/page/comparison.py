@@ -26,6 +26,7 @@ from irl_gym.page.worlds import one_world, run_places, run_title
 from irl_gym.page.written import counted, number, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.runs import SURPRISES, Run, not_understood
+from irl_gym.shares import judged
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26
@@ -109,10 +110,11 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
     told = {name: policy_row(name, row) for name, row in policies.items()}
     yield "environment", place
     yield "score of the retrained agent", told["retrained"]["score"]
-    for name in ("expert", "retrained", "random"):
-        yield f"value, {told[name]['name']}", told[name]["value"]
-    for name in ("expert", "retrained", "random"):
+    for name in ("retrained", "expert", "random"):
         yield f"mean return (95 %), {told[name]['name']}", told[name]["returns"]
+    yield "judged by the worse of the two", judged(policies, run.metrics.get("table")).brief
+    for name in ("retrained", "expert", "random"):
+        yield f"value, {told[name]['name']}", told[name]["value"]
     if any(row["agreement"] is not None for row in policies.values()):
         yield "agreement, retrained agent", told["retrained"]["agreement"]
     if reward.get("worst_tie_regret_share") is not None:

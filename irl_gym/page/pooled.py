@@ -7,8 +7,9 @@ from irl_gym.page.panels import Panel
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
 from irl_gym.page.worlds import levels_of, levels_told
-from irl_gym.page.written import number, percent, score_of, with_ends
+from irl_gym.page.written import number, percent, with_ends
 from irl_gym.pooling import Pool, over_environments
+from irl_gym.scores import score_of
 
 TRIMMED = 4
 """Seeds from which on an interquartile mean leaves some out."""
@@ -47,8 +48,15 @@ def told(pool: Pool) -> str:
     """A pool in one line."""
     n = len(pool.runs)
     if pool.score is None:
-        return f"{called(pool)}: no score, since not every one of the {n} seeds has one"
-    return f"{called(pool)}: score {spoken(pool.score)}, {averaged(pool)} over {n} seeds"
+        return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
+    means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
+    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}"
+
+
+def returned(pool: Pool) -> str:
+    """The mean return of a pool's agents, and what there is to compare it with."""
+    random, expert = (number(pool.mean_returns[name].estimate) for name in ("random", "expert"))
+    return f"mean return {with_ends(pool.mean_returns['retrained'])} where random actions have {random}, the expert {expert}"
 
 
 def averaged(pool: Pool) -> str:
@@ -65,14 +73,20 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
     """What the table says of a pool."""
     config, letter = pool.first.config, next(iter(pool.runs))
     lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values()]
-    scores = pool.scores
+    scores, returns = pool.scores, pool.mean_returns
     return {
         "environment": places[letter],
         "learner": str((config.get("learner") or {}).get("type", "")),
         "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
         "score of the retrained agents (95 %)": spoken(pool.score),
-        "the worst and the best seed": "none" if scores is None else f"{score_of(scores.min())} and {score_of(scores.max())}",
-        "mean return of the retrained agents (95 %)": with_ends(pool.mean_return),
+        "mean return of the retrained agents (95 %)": with_ends(returns["retrained"]),
+        "mean return of random actions and of the expert": " and ".join(
+            number(returns[name].estimate) for name in ("random", "expert")
+        ),
+        "judged by the worse of the two": pool.judged.brief,
+        "score of the worst and the best seed": "none"
+        if scores is None
+        else " and ".join(map(score_of, (scores.min(), scores.max()))),
         "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
     }
 

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from irl_gym.diagnoses.spoken import usable_flags, with_names
+from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import told_record
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
+from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
+from irl_gym.scores import score_of
+from irl_gym.shares import MUCH, judged, returns_of
 
-GOOD, MUCH = 0.9, 0.05
-"""A score that is good, and a share lost by the worst tie that is much."""
 UNKNOWN = "one episode tells no noise"
 """In place of a standard error that there is none of."""
 ROUNDING = 1e-7
@@ -25,31 +26,55 @@ STAGES_LEAD = (
 
 
 def verdict(run: Run) -> dict[str, Any]:
-    """The sentence at the top and three figures, each with whether it is good."""
+    """The sentence at the top, four figures, each with whether it is good, and how the agent was judged."""
     agent, reward = run.metrics["policies"]["retrained"], run.metrics["reward"]
     score, share = agent.get("score"), reward.get("worst_tie_regret_share")
-    optimal = reward.get("expert_optimal")
+    optimal, found = reward.get("expert_optimal"), judged(run.metrics["policies"], run.metrics.get("table"))
+    lost = "" if share is None else f"{sum_of(max(reward['worst_tie_regret'], 0.0))} of value, as a share "
     figures = [
         {
-            "label": "score of the retrained agent",
+            "label": "the agent's score",
             "value": score_of(score),
             "note": "random actions are 0, the expert is 1" if score is not None else _no_score(run),
-            "mood": "plain" if score is None else "good" if score >= GOOD else "bad",
+            "mood": found.mood,
+        },
+        {
+            "label": "the agent's mean return",
+            "value": number(agent.get("mean_return")),
+            "note": _returns(run),
+            "mood": found.mood,
         },
         {
             "label": "lost by the worst tie",
             "value": "not known" if share is None else percent(max(share, 0.0)),
-            "note": "of what the expert has over random, by the worst policy that is best under the learned reward",
+            "note": f"{lost}of what the expert has over random, by the worst policy that is best under the learned reward",
             "mood": "plain" if share is None else "good" if share <= MUCH else "bad",
         },
         {
-            "label": "expert optimal under the reward",
+            "label": "expert optimal under it",
             "value": answer(optimal),
             "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
             "mood": "bad" if optimal is False or reward.get("degenerate") else "good" if optimal else "plain",
         },
     ]
-    return {"sentence": _sentence(run, score, share, optimal), "figures": figures}
+    return {
+        "sentence": _sentence(run, score, share, optimal),
+        "figures": figures,
+        "judged": f"How score and mean return are coloured: {found.told}",
+    }
+
+
+def _returns(run: Run) -> str:
+    """The interval of the agent's mean return, and what random actions and the expert return."""
+    agent, random, expert = (returns_of(run.metrics["policies"][name]) for name in ("retrained", "random", "expert"))
+    if agent is None:
+        return "not recorded in this version"
+    sure = f"95 %: {number(agent.low)} to {number(agent.high)}" if agent.known else f"{TOO_FEW} how surely"
+    return f"{sure}; random actions have {_mean(random)}, the expert {_mean(expert)}"
+
+
+def _mean(found: Interval | None) -> str:
+    return number(None if found is None else found.estimate)
 
 
 def answer(optimal: bool | None) -> str:
@@ -73,11 +98,13 @@ def _proved(reward: Mapping[str, Any]) -> str:
 
 def _sentence(run: Run, score: float | None, share: float | None, optimal: bool | None) -> str:
     agent = run.metrics["policies"]["retrained"]
+    random, expert = (_mean(returns_of(run.metrics["policies"][name])) for name in ("random", "expert"))
+    who, returned = "The agent that saw only the recovered reward has", f"a mean return of {_mean(returns_of(agent))}"
     earned = (
-        f"The agent that saw only the recovered reward has a score of {score_of(score)}: random actions are 0, the expert is 1"
+        f"{who} a score of {score_of(score)} and {returned}: random actions have 0 and {random}, the expert has 1 and {expert}"
         if score is not None
-        else f"The agent that saw only the recovered reward has value {number(agent['value'])}, and there is no score, as "
-        f"{_no_score(run)}"
+        else f"{who} value {number(agent['value'])} and {returned}: random actions have {random}, the expert {expert}; "
+        f"there is no score, as {_no_score(run)}"
     )
     tie = (
         ""

@@ -9,42 +9,67 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from irl_gym.page.panels import Panel
-from irl_gym.page.pooled import averaged, spoken
+from irl_gym.page.pooled import averaged, returned, spoken
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves, usual_levels
 from irl_gym.page.worlds import agree, levels_of, levels_told, one_scale, one_world, worth
-from irl_gym.page.written import number, score_of, sentence_of
+from irl_gym.page.written import number, sentence_of
 from irl_gym.pooling import Pool
 from irl_gym.runs import Run
+from irl_gym.scores import score_of
 
 TITLE = "Learning curves"
 
 
 def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
-    """Which agent is best, by score; of runs that only differ in their seed, how good they are together."""
+    """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
     scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
         return "None of these runs has a score; each run's own page says why."
     if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
-        expert = "the expert" if one_scale(named) else "the own expert of each"
-        return (
-            f"Over {len(named)} seeds the retrained agents have a score of {spoken(found[0].score)}, the {averaged(found[0])} "
-            f"with its 95 % interval. Random actions are 0, {expert} is 1."
-        )
+        expert, (pool,) = "the expert" if one_scale(named) else "the own expert of each", found
+        means = f"a score of {spoken(pool.score)} and a {returned(pool)}, each the {averaged(pool)} with its 95 % interval"
+        return f"Over {len(named)} seeds the retrained agents have {means}. By score random actions are 0, {expert} is 1."
     if not one_scale(named):
-        each = "; ".join(f"run {letter} {score_of(score)}" for letter, score in scores.items())
+        each = "; ".join(f"run {letter} {_earned(run)} ({_ends({letter: run})})" for letter, run in named.items())
         return (
-            f"Scores of the retrained agents: {each}. Random actions are 0, the expert is 1. {_unlike(named)}, so a score says "
-            "how near each agent comes to its own expert, not which run is better."
+            f"Scores of the retrained agents: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
+            "score says how near each agent comes to its own expert, not which run is better."
         )
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
+    scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(named)}."
     if score_of(known[best]) == score_of(known[worst]):
-        return f"The retrained agents are equally good, with a score of {score_of(known[best])}."
+        paid = _returned(named, "retrained")
+        return f"The retrained agents have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
-        f"The retrained agent of run {best} has the best score, {score_of(known[best])}; that of run {worst} the worst, "
-        f"{score_of(known[worst])}. Random actions are 0, the expert is 1."
+        f"The retrained agent of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
+        f"{_earned(named[worst])}.{_otherwise(named, best)} {scale}"
     )
+
+
+def _earned(run: Run) -> str:
+    """A score with its mean return."""
+    row = run.metrics["policies"]["retrained"]
+    return f"{score_of(row['score'])} with mean return {number(row['mean_return'])}"
+
+
+def _ends(named: Mapping[str, Run]) -> str:
+    """What random actions and the expert return."""
+    return f"random actions have {_returned(named, 'random')}, the expert {_returned(named, 'expert')}"
+
+
+def _returned(named: Mapping[str, Run], policy: str) -> str:
+    """The mean returns of a policy: the least and the largest of the runs."""
+    found = [run.metrics["policies"][policy]["mean_return"] for run in named.values()]
+    return " to ".join(dict.fromkeys(map(number, (min(found), max(found)))))
+
+
+def _otherwise(named: Mapping[str, Run], best: str) -> str:
+    """Which run has the highest mean return, if that is not the one with the best score."""
+    returns = {letter: run.metrics["policies"]["retrained"]["mean_return"] for letter, run in named.items()}
+    most = max(returns, key=lambda one: returns[one])
+    return "" if returns[most] == returns[best] else f" The highest mean return is that of run {most}, {number(returns[most])}."
 
 
 def _unlike(named: Mapping[str, Run]) -> str:

@@ -14,8 +14,9 @@ from irl_gym.page.document import write_page
 from irl_gym.page.proof import certificate, doctor, stages, table_facts, verdict
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.written import interval, number, percent, score_of
+from irl_gym.page.written import interval, number, percent
 from irl_gym.runs import Run
+from irl_gym.scores import score_of
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
 

@@ -32,13 +32,6 @@ def sum_of(value: float, digits: int = 4) -> str:
     return number(0.0 if abs(value) < ROUNDING else value, digits)
 
 
-def score_of(score: Any) -> str:
-    """A score with three decimals, which says 1.000 only of what is 1."""
-    if score is None or not math.isfinite(score):
-        return "none" if score is None else MISSING
-    return "above 0.999" if 0.9995 <= score < 1 - 1e-6 else f"{score:.3f}".replace("-0.000", "0.000")
-
-
 def aligned(values: np.ndarray) -> list[str]:
     """Numbers of one column: as many decimals as its largest needs, and what is too small for them said in words."""
     largest = float(np.abs(values).max(initial=0.0))

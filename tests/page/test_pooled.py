@@ -1,5 +1,6 @@
 """Runs over seeds, on the page and in its sentence."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -50,6 +51,9 @@ def test_seeds_are_a_section_with_a_table_and_a_curve_in_the_browser(page, look)
 def test_the_verdict_over_seeds_is_a_mean_with_an_interval(page, look):
     words = look(page).locator(".sentence").inner_text()
     assert words.startswith("Over 4 seeds the retrained agents have a score of") and "the interquartile mean" in words
+    assert re.search(
+        r"and a mean return [-0-9.]+ \(.* to .*\) where random actions have [0-9.]+, the expert [0-9.]+, each", words
+    )
     assert "the expert is 1." in words
 
 
@@ -65,7 +69,7 @@ def test_of_few_seeds_it_is_the_mean_and_says_so(seeds):
 
 def test_the_verdict_over_seeds_says_when_each_has_its_own_expert(seeds):
     named = lettered([*seeds[:3], with_metrics(seeds[3], "expert", value=9.0)])
-    assert sentence(named, pools(named)).endswith("Random actions are 0, the own expert of each is 1.")
+    assert sentence(named, pools(named)).endswith("By score random actions are 0, the own expert of each is 1.")
 
 
 def test_runs_of_one_seed_have_no_section(seeds):
@@ -74,14 +78,32 @@ def test_runs_of_one_seed_have_no_section(seeds):
 
 def test_a_pool_is_told_in_a_line(seeds):
     (pool,) = pools(lettered(seeds))
-    assert told(pool).startswith("runs A, B, C, D: score ") and told(pool).endswith("), interquartile mean over 4 seeds")
+    whose = "runs A, B, C, D, interquartile mean over 4 seeds: "
+    means = r"score [0-9.]+ \(.*\), mean return [-0-9.]+ \(.*\) where random actions have .*, the expert .*"
+    assert re.fullmatch(whose + means + r"; left open \(0.685 of value, 0.685 of mean return\)", told(pool))
 
 
 def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):
     runs = [with_metrics(seeds[0], "retrained", score=None), *seeds[1:3]]
     (pool,) = pools(lettered(runs))
-    assert told(pool) == "runs A, B, C: no score, since not every one of the 3 seeds has one"
-    assert cells(section_of(runs))["score of the retrained agents (95 %)"] == ["none"]
+    assert told(pool).startswith("runs A, B, C: no score, since not every one of the 3 seeds has one; mean return ")
+    found = cells(section_of(runs))
+    assert (found["score of the retrained agents (95 %)"], found["judged by the worse of the two"]) == (
+        ["none"],
+        ["not judged"],
+    )
+
+
+def test_a_pool_is_judged_by_the_worse_of_its_means(seeds):
+    paid = {"expert": (500.0, 1.0), "random": (22.0, 0.0), "retrained": (425.0, 0.977)}
+    runs = list(seeds[:3])
+    for i, run in enumerate(runs):
+        for name, (mean, score) in paid.items():
+            run = with_metrics(run, name, mean_return=mean + i, score=score + 1e-4 * i)
+        runs[i] = run
+    found = cells(section_of(runs))
+    assert found["judged by the worse of the two"] == ["not good (0.977 of value, 0.843 of mean return)"]
+    assert found["mean return of random actions and of the expert"] == ["23 and 501"]
 
 
 def test_seeds_whose_curves_have_other_steps_have_a_table_only(seeds):

@@ -15,7 +15,8 @@ from irl_gym.page.scene import Scene
 from irl_gym.page.slider import lambda_slider
 from irl_gym.page.training import widths
 from irl_gym.page.worlds import run_places
-from irl_gym.page.written import aligned, percent, score_of, state_called
+from irl_gym.page.written import aligned, percent, state_called
+from irl_gym.scores import score_of
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_the_worst_tie_says_of_what_it_loses(lake):
 def test_a_score_has_one_form(lake):
     score = score_of(lake.metrics["policies"]["retrained"]["score"])
     told = verdict(lake)
-    assert told["figures"][0]["value"] == score and f"a score of {score}" in told["sentence"]
+    assert told["figures"][0]["value"] == score and f"a score of {score} and a mean return of" in told["sentence"]
 
 
 def test_rounding_is_no_distance_to_the_optimum(lake):

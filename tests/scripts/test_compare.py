@@ -61,7 +61,8 @@ def test_seeds_of_one_setting_are_told_together(script, finished):
         config.write_text(json.dumps({**json.loads(config.read_text()), "seed": seed}))
     made = script("compare", "seed0", "seed1", cwd=finished)
     line, wrote = made.stdout.splitlines()
-    assert line == "runs A, B: score 1.000 (too few to say), mean over 2 seeds" and wrote.startswith("Wrote compare.html")
+    assert line.startswith("runs A, B, mean over 2 seeds: score 1.000 (too few to say), mean return 0.")
+    assert line.endswith("; good (1.000 of value, 1.000 of mean return)") and wrote.startswith("Wrote compare.html")
 
 
 def test_runs_that_are_no_seeds_of_one_setting_are_told_apart(script, finished):

@@ -58,7 +58,7 @@ def soft_lp(P, gamma, expert, *, weights, slack=None, cap=None, l1=0.0, r_max=1.
 
 
 def breakable(P, gamma, expert):
-    """(S, A) rows of (4) that some reward makes strict, with all other rows in known states at 0 or above: an LP a row, in V."""
+    """(S, A) rows of (4) that some reward makes strict, the other known rows at 0 or above: an LP a row, in V."""
     S, A, _ = P.shape
     known = ~np.isnan(expert).any(axis=1) & (P.sum(axis=(1, 2)) > 0)
     pi = np.where(known[:, None], expert, 1 / A)

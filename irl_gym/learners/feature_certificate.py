@@ -27,9 +27,14 @@ class FeatureCertificate(Proven):
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     margin: np.ndarray
-    """(S,) smallest margin of the expert over another action, NaN where there is none; (|S_0|,) of a generative model."""
+    """(S,) smallest margin of the expert over another action, over the rows not listed as unbreakable; NaN where there is none;
+    (|S_0|,) of a generative model."""
     violated: Indices
     """States, rows of the table or numbers in S_0, in which another action is better than the expert's."""
+    unbreakable: Indices
+    """States of S_0 with a row of (10) that no weights that satisfy (10) in all of S_0 make strict, as a program found."""
+    unbreakable_rows: np.ndarray
+    """(u, 2) state and action of each such row: left out of `margin`, one by one. Without a cap no program asks: empty."""
     objective: float
     """sum over S_0 of p(margin), minus l1 ||alpha||_1, recomputed."""
     dual_bound: float
@@ -77,6 +82,9 @@ class FeatureCertificate(Proven):
         ]
         if not self.expressible:
             lines.append("expressible              no reward in the span of the features makes the expert optimal")
+        if self.unbreakable.size:
+            count, states = len(self.unbreakable_rows), self.unbreakable.size
+            lines.append(f"unbreakable              {count} rows of (10), in {states} states, that no such weights make strict")
         if self.degenerate:
             lines.append(f"degenerate               {'R is zero' if self.zero else 'R ties the expert with every action'}")
         if self.standard_error is not None:
@@ -89,26 +97,34 @@ class Judged:
     """The margins of a reward, and what rounding or noise leaves of them."""
 
     margin: np.ndarray
-    """Smallest margin of each state; NaN where there is none."""
-    tied: np.ndarray
-    """The largest difference between actions that the expert takes in a state; 0 where it takes one."""
+    """Smallest margin of each state, over the rows that count; NaN where there is none."""
+    short: np.ndarray
+    """By what the expert's action is worse than the best in each state, or differs from another that it takes; at least 0."""
     tolerance: float | np.ndarray
     """A violation below this is none; one number, or one for each state."""
     indifferent: bool
     """Is the expert tied with every action in every state judged?"""
 
 
-def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, discounted: Discounted) -> Judged:
-    """Margins (S,) under R (S,) of every reachable state in which the expert is known, by one solve and one product."""
+def judge_table(
+    mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, discounted: Discounted, ties: np.ndarray
+) -> Judged:
+    """Margins (S,) under R (S,) of every reachable state in which the expert is known, by one solve and one product.
+
+    `ties` (u, 2) are states and actions that no margin is taken over.
+    """
     distribution = as_distribution(expert, mdp.n_states, mdp.n_actions)
     V = discounted.solve(R)
     onwards = (mdp.P @ V).reshape(mdp.n_states, mdp.n_actions)
     advantage = (distribution * onwards).sum(axis=1, keepdims=True) - onwards
     taken = distribution > 0
     judged = mdp.reachable & ~mdp.terminal & known
-    margin = np.where(taken, np.inf, advantage).min(axis=1)
+    others = np.where(taken, np.inf, advantage)
+    short = np.maximum(-others.min(axis=1), np.where(taken, np.abs(advantage), 0.0).max(axis=1))
+    others[tuple(ties.T)] = np.inf
+    margin = others.min(axis=1)
     scale = float(np.abs(R).max(initial=0.0))
     tolerance = OPTIMAL_WITHIN * scale * (1 + 0.1 / (1 - mdp.gamma))
     margin[~judged | ~np.isfinite(margin)] = np.nan
-    tied = np.where(judged, np.where(taken, np.abs(advantage), 0.0).max(axis=1), 0.0)
-    return Judged(margin, tied, tolerance, bool(np.abs(advantage[judged]).max(initial=0.0) <= tolerance))
+    short = np.where(judged, np.maximum(short, 0.0), 0.0)
+    return Judged(margin, short, tolerance, bool(np.abs(advantage[judged]).max(initial=0.0) <= tolerance))

@@ -8,7 +8,8 @@ from hypothesis.extra import numpy as hnp
 
 from irl_gym.errors import SolverTimeout
 from irl_gym.learners import weights
-from irl_gym.learners.weights import Rows, best_weights, most_agreement
+from irl_gym.learners.expressible import most_agreement
+from irl_gym.learners.weights import Rows, best_weights
 
 WHOLE = 10**9
 KINDS = ("normal", "ties", "low rank", "zeros", "scaled")

@@ -222,7 +222,7 @@ def test_path_takes_an_expert_unknown_only_where_nothing_is_done(grid):
 
 def test_time_limit_says_what_to_do():
     with pytest.raises(SolverTimeout, match="raise time_limit, or give most_pieces"):
-        lambda_path(GRID.mdp, GRID.expert, time_limit=1e-6)
+        lambda_path(GRID.mdp, GRID.expert, time_limit=1e-9)
 
 
 @pytest.mark.parametrize("settings", [{"r_max": 0}, {"margin_cap": -1.0}, {"most_pieces": 1}, {"time_limit": 0}])

@@ -2,17 +2,14 @@
 
 import os
 import pickle
-import random
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from enumeration_envs import Board, Corridor, Slippery, same_table
+from stopped import run_until
 
 from irl_gym.enumeration.explored import Explored
 from irl_gym.enumeration.table import Enumeration
@@ -140,28 +137,21 @@ def test_a_finished_search_is_read_again_without_searching(tmp_path):
 
 
 def test_a_search_that_was_killed_goes_on_to_the_same_table(tmp_path):
-    path = tmp_path / "search.npz"
-    script = (
-        "import time\nfrom enumeration_envs import Board\nfrom irl_gym.enumeration.table import Enumeration\n"
-        f"Enumeration(checkpoint={str(path)!r}, every=0.05).table(Board(40, lambda: time.sleep(2e-4)), 0.9)\n"
+    path, script = tmp_path / "search.npz", tmp_path / "search.py"
+    script.write_text(
+        "from enumeration_envs import Board\nfrom irl_gym.enumeration.table import Enumeration\n"
+        f"Enumeration(checkpoint={str(path)!r}, every=0).table(Board(15, lambda: None), 0.9)\n"
     )
-    tests = str(Path(__file__).parents[1])
-    rng = random.Random(0)
-    for kill in range(2):
-        process = subprocess.Popen([sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": tests})
-        began, before = time.monotonic(), path.stat().st_mtime_ns if path.exists() else 0
-        while process.poll() is None and time.monotonic() - began < 60:
-            if path.exists() and path.stat().st_mtime_ns != before:
-                break
-            time.sleep(0.01)
-        time.sleep(0.3 * rng.random())
-        assert process.poll() is None, f"it ended before kill {kill}"
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    with np.load(path, allow_pickle=False) as kept:
-        assert 1 < len(kept["first_line"]) < 1600
-    env = Board(40, lambda: None)
+    expanded = [0]
+    for where, nth in (("os:replace", 20), ("enumeration_envs:Board.step", 1_200)):  # before the file is renamed; in a step
+        made = run_until(script, where=where, nth=nth, sent=signal.SIGKILL)
+        assert made.returncode == -signal.SIGKILL, made.stderr
+        with np.load(path, allow_pickle=False) as kept:
+            expanded.append(len(kept["first_line"]))
+    assert 0 < expanded[1] < expanded[2] < 225
+    env = Board(15, lambda: None)
     assert same_table(Enumeration(checkpoint=path).table(env, 0.9), Enumeration().table(env, 0.9))
+    script.unlink()
     assert [one.name for one in tmp_path.iterdir()] == ["search.npz"]
 
 

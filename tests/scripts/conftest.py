@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from stopped import HANG
 
 ROOT = Path(__file__).parents[2]
 PLAN = ("--episodes", "5", "--retrain", "value-iteration")
@@ -14,7 +15,7 @@ PLAN = ("--episodes", "5", "--retrain", "value-iteration")
 def script():
     def run(name, *arguments, cwd):
         command = [sys.executable, str(ROOT / "scripts" / f"{name}.py"), *map(str, arguments)]
-        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
+        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=HANG)
 
     return run
 

@@ -6,13 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from stopped import HANG
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "reproduce_ng_russell.py"
 FIGURES = {"figure_1.png", "figure_2.png", "figure_4.png", "figure_5.png"}
 
 
 def run(*arguments, cwd):
-    return subprocess.run([sys.executable, str(SCRIPT), *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    return subprocess.run([sys.executable, str(SCRIPT), *arguments], cwd=cwd, capture_output=True, text=True, timeout=HANG)
 
 
 @pytest.fixture(scope="module")

@@ -210,7 +210,7 @@ gym.register("Counted-v0", entry_point=Counted, max_episode_steps=150)
 asked = Experiment("Counted-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration(), table=Enumeration(every=0))
 told = []
 recover_and_retrain(asked, sys.argv[1], lambda *one: told.append(one))
-print(next(share for stage, share in told if stage == "table" and share is not None))
+print(told[1][1])
 """
 
 
@@ -223,7 +223,7 @@ def test_an_enumeration_that_was_killed_continues_and_ends_in_the_same_bytes(tmp
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     assert [path.name for path in (tmp_path / "killed").iterdir() if not path.name.startswith("..")] == [half.name]
     first_told = [float(start(out).stdout) for out in ("killed", "fresh")]
-    assert first_told[0] > 0.3 > first_told[1]
+    assert first_told[0] == 1.0 > first_told[1]
     for name in ("metrics.json", "certificate.json", "reward.npz", "config.json"):
         first, second = ((tmp_path / out / name).read_bytes() for out in ("killed", "fresh"))
         assert first == second, (json.loads(first), json.loads(second)) if name == "metrics.json" else name

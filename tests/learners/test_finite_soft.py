@@ -154,7 +154,7 @@ def test_states_not_visited_have_no_rows():
 
 
 def test_a_large_slack_gives_the_hard_program():
-    for seed in range(20):
+    for seed in range(8):
         model, expert, visits = seen(seed)
         for fields in (CAPPED, PRICED, {}):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, expert, visits=visits) for C in (None, 1e4))
@@ -163,7 +163,7 @@ def test_a_large_slack_gives_the_hard_program():
 
 
 def test_a_large_slack_gives_the_hard_program_where_the_expert_is_known_everywhere():
-    for seed in range(20):
+    for seed in range(8):
         model = models.random_model(seed, kind="walls")
         for fields in (CAPPED, PRICED, {}, PAPER):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, model.expert) for C in (None, 1e4))

@@ -1,8 +1,10 @@
 """Scripts as a person runs them, by subprocess, and a run that several tests only read."""
 
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from stopped import HANG
@@ -18,6 +20,21 @@ def script():
         return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=HANG)
 
     return run
+
+
+@pytest.fixture
+def called(capsys, monkeypatch, unchecked):
+    """A script called in this process with a command line: what it returns and says, without another start of Python."""
+
+    def call(path, *arguments, cwd):
+        monkeypatch.chdir(cwd)
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(path), run_name="__main__")
+        said = capsys.readouterr()
+        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
+
+    return call
 
 
 @pytest.fixture(scope="session")

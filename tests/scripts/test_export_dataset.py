@@ -54,8 +54,8 @@ def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
         (("--env-id", "CartPole-v1", "--env-kwargs", "{}"), "Or choose ppo, dqn or a2c"),
     ],
 )
-def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, arguments, says):
-    made = run(*LAKE, "--root", str(tmp_path), *arguments)
+def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, called, arguments, says):
+    made = called(SCRIPT, *LAKE, "--root", str(tmp_path), *arguments, cwd=tmp_path)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
     assert not list(tmp_path.iterdir())
 

@@ -86,8 +86,8 @@ def test_a_terminal_without_arrows_is_no_reason_to_lose_a_game(tmp_path):
         (("--env-kwargs", "8x8"), "InvalidParameter: env-kwargs has '8x8'"),
     ],
 )
-def test_a_mistake_gets_one_clear_line(tmp_path, arguments, says):
-    made = piped("", *arguments, cwd=tmp_path)
+def test_a_mistake_gets_one_clear_line(tmp_path, called, arguments, says):
+    made = called(SCRIPT, "--root", "data", *arguments, cwd=tmp_path)
     assert made.returncode == 2 and made.stderr.startswith(says) and made.stderr.count("\n") == 1
 
 

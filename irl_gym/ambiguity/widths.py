@@ -3,8 +3,8 @@
 The feasible set (Ng & Russell 2000, (4)) is a cone: with R it holds 2 R, and 0. Without an anchor every width is infinite or
 says nothing, so the set is cut in two places:
     |R| <= R_max           the scale
-    margins >= tau         in every state that can have one; tau > 0 keeps out R = 0 and all that ties the expert with others
-tau is half of the largest margin that all states can have at once, as in `FiniteLP(margin_cap="auto")`: the set is then that of
+    margins >= tau         in every row that can be strict; tau > 0 keeps out R = 0 and all that ties the expert with others
+tau is half of the largest margin that all these can have at once, as in `FiniteLP(margin_cap="auto")`: the set is then that of
 all optima of the capped program as l1 goes to 0, before the norm chooses among them. What `FiniteLP()` learns lies in it.
 `margin=None` asks for (4) alone, `pinned` for rewards that are known, such as a goal's.
 

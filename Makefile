@@ -32,6 +32,7 @@ wheel: $(READY)
 
 bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment, the paper (about an hour)
 	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m 'hypothesis and not slow' --hypothesis-profile thorough
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py
 	$(BIN)/python scripts/measure_learners.py

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym._typing import Indices, Numbers, Vector
+from irl_gym._typing import ActionSets, Indices, Numbers, Vector
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
@@ -89,6 +89,12 @@ class Certificate(Proven):
     def degenerate(self) -> bool:
         """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
         return self.zero or self.indifferent
+
+    def served(self, n_actions: int) -> ActionSets:
+        """(S, A) actions of states with half of the cap or more as their margin, but those listed as unbreakable."""
+        found = (np.nan_to_num(self.margin) > (self.margin_cap or 0.0) / 2)[:, None].repeat(n_actions, axis=1)
+        found[tuple(self.unbreakable_rows.T)] = False
+        return found
 
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""

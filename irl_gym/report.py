@@ -256,6 +256,9 @@ def _told_feature(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     cap, gap = reward["margin_cap"], max(reward["duality_gap"], 0.0)
     yield "margin cap", "none (Ng & Russell's own program)" if cap is None else f"{cap:.4g}"
     yield "objective", f"{reward['objective']:.5g}, at most {gap:.1e} below the optimum"
+    if reward.get("unbreakable_states"):
+        told = "there no reward in the span of the features that makes the expert optimal prefers its action to some other."
+        yield "states with lasting ties", f"{reward['unbreakable_states']}: {told}"
     if not reward["expressible"]:
         yield "expressible", "NO: no reward in the span of the features makes the expert optimal. Try more --features"
 

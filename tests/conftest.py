@@ -8,7 +8,8 @@ import gymnasium as gym  # noqa: E402  (nothing of irl_gym may be imported befor
 import hypothesis  # noqa: E402
 import pytest  # noqa: E402
 
-hypothesis.settings.register_profile("irl_gym", deadline=None, derandomize=True, max_examples=25, database=None)
+for profile, examples in (("irl_gym", 15), ("thorough", 100)):  # the second by `make bars`
+    hypothesis.settings.register_profile(profile, deadline=None, derandomize=True, max_examples=examples, database=None)
 hypothesis.settings.load_profile("irl_gym")
 
 

@@ -50,7 +50,7 @@ class Slippery(Corridor):
             case "normal":
                 return self.np_random.normal() < -0.8416212335729143  # the quantile of 0.2
             case "many outcomes":
-                return self.np_random.integers(50_000) < 10_000
+                return self.np_random.integers(25_000) < 5_000
             case "mixed":
                 return self.np_random.normal() < -0.8416212335729143 if self.cell == 1 else self.np_random.random() < 0.2
         raise AssertionError(self.kind)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from stopped import HANG
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("wrap-any-environment", "bring-your-own-demonstrations", "reward-distances", "ambiguity", "doctor")
@@ -81,7 +82,7 @@ def run(command, folder, given=None, shell=False):
     """What a process in an otherwise empty world prints, and its errors."""
     surroundings = os.environ | {"MINARI_DATASETS_PATH": str(folder / "datasets"), "COLUMNS": "120"}
     done = subprocess.run(
-        command, cwd=folder, env=surroundings, input=given, capture_output=True, text=True, shell=shell, timeout=300
+        command, cwd=folder, env=surroundings, input=given, capture_output=True, text=True, shell=shell, timeout=HANG
     )
     return done.stdout, done.stderr
 

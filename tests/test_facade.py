@@ -21,7 +21,6 @@ def test_importing_loads_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
 
 
-def test_importing_takes_less_than_a_third_of_a_second():
-    code = "import time; start = time.perf_counter(); import irl_gym; print(time.perf_counter() - start)"
-    made = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout) for _ in range(3)]
-    assert min(made) < 0.3
+def test_importing_loads_no_other_module_of_the_library():
+    code = "import sys, irl_gym; print(sorted(name for name in sys.modules if name.startswith('irl_gym')))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "['irl_gym']"

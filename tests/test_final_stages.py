@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from stopped import HANG
 
 from irl_gym import filming
 from irl_gym.errors import RunIncomplete
@@ -66,7 +67,7 @@ def test_a_run_killed_in_a_late_stage_continues_with_it(finished, tmp_path, stag
     out, left = shutil.copytree(finished, tmp_path / "run"), LATE[LATE.index(stage) :]
     for name in left:
         (out / ".stages" / f"{name}.json").unlink()
-    made = subprocess.run([sys.executable, "-c", KILLED, dies_in, str(out)], capture_output=True, text=True, timeout=120)
+    made = subprocess.run([sys.executable, "-c", KILLED, dies_in, str(out)], capture_output=True, text=True, timeout=HANG)
     assert made.returncode == -signal.SIGKILL and (out / f".{stage}.tmp").is_dir(), made.stderr
     if stage != "report":  # the page is not needed to read a run
         with pytest.raises(RunIncomplete, match=f"the stage '{stage}' was not finished"):

@@ -32,6 +32,26 @@ def report(tmp_path_factory):
     return recover_and_retrain(small(), tmp_path_factory.mktemp("loop") / "run")
 
 
+@pytest.fixture(scope="module")
+def continued(tmp_path_factory):
+    """The same run, stopped after three stages and continued, and when its reward was written."""
+    out = tmp_path_factory.mktemp("continued") / "run"
+    first = Loop(small(), out)
+    for stage in ("expert", "demonstrations", "reward"):
+        first.stage(stage)
+    kept = (out / "reward.npz").stat().st_mtime_ns
+    return recover_and_retrain(small(), out), kept
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """A run whose agent is planned, and the share that each stage was told last."""
+    seen = {}
+    asked = small(retrain=ValueIteration(), shaping=False)
+    made = recover_and_retrain(asked, tmp_path_factory.mktemp("planned"), lambda stage, share: seen.update({stage: share}))
+    return made, seen
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_run_leaves(report, name):
     assert (report.out / name).stat().st_size > 0
@@ -94,8 +114,8 @@ def test_the_certificate_is_that_of_the_reward(report):
     assert report.certificate["expert_optimal"] and reward.values.shape == (16,)
 
 
-def test_the_same_seed_gives_the_same_bytes(report, tmp_path):
-    again = recover_and_retrain(small(), tmp_path / "run")
+def test_the_same_seed_gives_the_same_bytes(report, continued):
+    again, _ = continued
     names = [name for name in FILES if name != "agent.zip"]  # a zip holds the time it was made
     data = "dataset/irl_gym/frozenlake-v1-expert-v0/data/main_data.hdf5"
     differing = [name for name in [*names, data] if (report.out / name).read_bytes() != (again.out / name).read_bytes()]
@@ -108,13 +128,9 @@ def test_a_finished_run_is_read_not_run_again(report):
     assert {path: path.stat().st_mtime_ns for path in report.out.rglob("*")} == before
 
 
-def test_a_run_that_stopped_continues_after_its_last_stage(report, tmp_path):
-    first = Loop(small(), tmp_path / "run")
-    for stage in ("expert", "demonstrations", "reward"):
-        first.stage(stage)
-    kept = (tmp_path / "run" / "reward.npz").stat().st_mtime_ns
-    again = recover_and_retrain(small(), tmp_path / "run")
-    assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept
+def test_a_run_that_stopped_continues_after_its_last_stage(report, continued):
+    again, kept = continued
+    assert (again.out / "reward.npz").stat().st_mtime_ns == kept
     assert again.metrics == report.metrics
 
 
@@ -123,9 +139,8 @@ def test_another_experiment_in_the_same_folder_is_refused(report):
         recover_and_retrain(small(seed=1), report.out)
 
 
-def test_progress_reaches_the_end_of_each_stage(tmp_path):
-    seen = {}
-    recover_and_retrain(small(retrain=ValueIteration()), tmp_path, lambda stage, share: seen.update({stage: share}))
+def test_progress_reaches_the_end_of_each_stage(planned):
+    _, seen = planned
     assert set(seen) == {
         "table",
         "expert",
@@ -141,13 +156,13 @@ def test_progress_reaches_the_end_of_each_stage(tmp_path):
     assert set(seen.values()) == {1.0}
 
 
-def test_a_planner_on_the_recovered_reward_is_optimal(tmp_path):
-    made = recover_and_retrain(small(retrain=ValueIteration(), shaping=False), tmp_path)
+def test_a_planner_on_the_recovered_reward_is_optimal(planned):
+    made, _ = planned
     assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
 
 
 def test_an_sb3_expert_can_demonstrate(tmp_path):
-    made = recover_and_retrain(small(expert=SB3(total_timesteps=60_000), retrain=ValueIteration()), tmp_path)
+    made = recover_and_retrain(small(expert=SB3(total_timesteps=30_000), retrain=ValueIteration()), tmp_path)
     assert made.metrics["policies"]["retrained"]["value"] == pytest.approx(made.metrics["policies"]["expert"]["value"])
 
 

@@ -2,12 +2,10 @@
 
 import io
 import json
-import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import gymnasium as gym
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 from rich.console import Console
+from stopped import HANG
 
 from irl_gym.counting import Interaction
 from irl_gym.datasets import read_minari
@@ -182,8 +181,8 @@ def test_the_report_says(runs, name, width):
 
 # --- killed ---
 
-SLOW = """
-import sys, time
+KILLED = """
+import os, signal, sys
 import gymnasium as gym
 from gymnasium import spaces
 from irl_gym.enumeration.table import Enumeration
@@ -191,42 +190,40 @@ from irl_gym.experiment import Experiment
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
 
-class Slow(gym.Env):
-    observation_space, action_space = spaces.MultiDiscrete([40, 40]), spaces.Discrete(4)
+class Counted(gym.Env):
+    observation_space, action_space = spaces.MultiDiscrete([12, 12]), spaces.Discrete(4)
     steps = 0
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        self.x, self.y = 20, 20
+        self.x, self.y = 6, 6
         return (self.x, self.y), {}
     def step(self, action):
-        Slow.steps += 1
-        time.sleep(float(sys.argv[2]))
+        Counted.steps += 1
+        if Counted.steps == int(sys.argv[2]):
+            os.kill(os.getpid(), signal.SIGKILL)
         dx, dy = ((0, 1), (1, 0), (0, -1), (-1, 0))[action]
-        self.x, self.y = min(max(self.x + dx, 0), 39), min(max(self.y + dy, 0), 39)
-        end = self.x == self.y == 39
+        self.x, self.y = min(max(self.x + dx, 0), 11), min(max(self.y + dy, 0), 11)
+        end = self.x == self.y == 11
         return (self.x, self.y), float(end), end, False, {}
 
-gym.register("Slow-v0", entry_point=Slow, max_episode_steps=150)
-asked = Experiment("Slow-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration(), table=Enumeration(every=0.2))
-recover_and_retrain(asked, sys.argv[1], lambda stage, share: stage == "expert" and share == 0 and print(Slow.steps))
+gym.register("Counted-v0", entry_point=Counted, max_episode_steps=150)
+asked = Experiment("Counted-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration(), table=Enumeration(every=0))
+told = []
+recover_and_retrain(asked, sys.argv[1], lambda *one: told.append(one))
+print(told[1][1])
 """
 
 
 def test_an_enumeration_that_was_killed_continues_and_ends_in_the_same_bytes(tmp_path):
-    def start(out, pause):
-        command = [sys.executable, "-c", SLOW, str(tmp_path / out), pause]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1])
+    def start(out, dies_at=0):
+        command = [sys.executable, "-c", KILLED, str(tmp_path / out), str(dies_at)]
+        return subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[1], timeout=HANG)
 
-    process, deadline = start("killed", "0.0005"), time.monotonic() + 60
-    half = tmp_path / "killed" / ".enumeration.tmp.npz"
-    while not (half.exists() and half.stat().st_size > 150_000) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.communicate()
+    killed, half = start("killed", 8_000), tmp_path / "killed" / ".enumeration.tmp.npz"
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
     assert [path.name for path in (tmp_path / "killed").iterdir() if not path.name.startswith("..")] == [half.name]
-    again, fresh = start("killed", "0"), start("fresh", "0")
-    made = [int(one.communicate(timeout=120)[0].split()[0]) for one in (again, fresh)]
-    assert made[0] < made[1]
+    first_told = [float(start(out).stdout) for out in ("killed", "fresh")]
+    assert first_told[0] == 1.0 > first_told[1]
     for name in ("metrics.json", "certificate.json", "reward.npz", "config.json"):
         first, second = ((tmp_path / out / name).read_bytes() for out in ("killed", "fresh"))
         assert first == second, (json.loads(first), json.loads(second)) if name == "metrics.json" else name

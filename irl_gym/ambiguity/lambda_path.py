@@ -22,6 +22,7 @@ from irl_gym.ambiguity.envelope import envelope
 from irl_gym.ambiguity.feasible import jsonable
 from irl_gym.ambiguity.path_changes import Change, changes
 from irl_gym.ambiguity.priced import PricedProgram
+from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
 from irl_gym.learners.feature_rows import completed
@@ -70,7 +71,8 @@ class LambdaPath:
     solves: int = 0
     """Linear programs solved."""
     violation: float = 0.0
-    """The largest violation of (4) by a piece, recomputed from P, relative to R_max or the cap, the smaller."""
+    """The largest violation of (4) by a piece, recomputed from P, relative to R_max or the cap, the smaller; NaN where the file
+    that the path is read from does not say."""
 
     FORMATS: ClassVar[tuple[str, ...]] = (FORMAT,)
 
@@ -132,6 +134,7 @@ class LambdaPath:
         """The path in three lines."""
         kind = "all" if self.exact else "some of its" if not self.whole else "not certified:"
         off = "" if self.violation <= CERTIFIED else f", and violates (4) by {self.violation:.1e} of what a margin can be"
+        off = ", and how far it violates (4) was not noted" if np.isnan(self.violation) else off
         return (
             f"lambda path     {kind} {self.n_pieces} pieces from 0 to lambda_0 = {self.lambda_0:.6g}, at most {self.gap:.1e} "
             f"below the optimum{off}\n||R||_1         {self.l1_norms[0]:.6g} to {self.l1_norms[-1]:.6g}\ntotal margin    "
@@ -141,7 +144,8 @@ class LambdaPath:
     def to_json(self) -> dict[str, Any]:
         """As json holds it, with the changes: NaN becomes None."""
         arrays = {name: jsonable(getattr(self, name)) for name in ARRAYS}
-        return arrays | self._header() | {"lambda_0": self.lambda_0, "changes": [one.to_json() for one in self.changes]}
+        header = {name: None if value != value else value for name, value in self._header().items()}
+        return arrays | header | {"lambda_0": self.lambda_0, "changes": [one.to_json() for one in self.changes]}
 
     def _header(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in (*NUMBERS, "whole", "violation")}
@@ -163,7 +167,7 @@ class LambdaPath:
         if missing:
             raise InvalidReward(f"{path} has no {missing[0]}: expected a file written by LambdaPath.save.")
         numbers = {name: header[name] for name in NUMBERS if name != "exact"}  # a property; before it was the search's own word
-        numbers |= {"whole": header.get("whole", header["exact"]), "violation": header.get("violation", 0.0)}
+        numbers |= {"whole": header.get("whole", header["exact"]), "violation": header.get("violation", np.nan)}
         return cls(**{name: arrays[name] for name in ARRAYS}, **numbers)
 
 
@@ -186,7 +190,7 @@ def lambda_path(
         margin_cap: None for the paper's program; the cap on margins; or "auto", FiniteLP's own, for the same expert.
         reward_on: "state" for R(s), "state-action" for R(s, a).
         most_pieces: pieces at most, at least 2: those that bring the path nearest to f first. None for all.
-        time_limit: seconds for the whole path, the cap aside.
+        time_limit: seconds for the whole path, but for the cap and the rows that can have a margin.
 
     Raises:
         InvalidMDP: mdp is no TabularMDP.
@@ -199,9 +203,10 @@ def lambda_path(
     if most_pieces is not None:
         checked_number("most_pieces", most_pieces, "a whole number of at least 2, or None for all", least=2, whole=True)
     expert = _known(checked_mdp(mdp), expert)
-    cap = learner.fit(mdp, expert).certificate.margin_cap if margin_cap == "auto" else margin_cap
+    served, cap = (None, None) if margin_cap is None else served_actions(learner, mdp, expert)
+    cap = cap if margin_cap == "auto" else margin_cap
     on_states = reward_on == "state"
-    program = PricedProgram(mdp, expert, r_max=r_max, cap=cap, on_states=on_states, time_limit=time_limit)
+    program = PricedProgram(mdp, expert, r_max=r_max, cap=cap, on_states=on_states, served=served, time_limit=time_limit)
     nothing = NO_MARGIN * min(r_max, np.inf if cap is None else cap)
     found = envelope(program.at, most_pieces, nothing) if program.states.size else None
     if found is None or found.breakpoints[-1] <= NO_MARGIN:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym._typing import ActionSets
 from irl_gym.ambiguity.envelope import Line
 from irl_gym.ambiguity.priced_rewards import PricedRewards
 from irl_gym.comparisons import compare
@@ -42,10 +43,19 @@ class PricedProgram:
         cap: the cap on margins; None is the paper's program, in which a row of equal successors takes its state's margin.
         on_states: R(s), or R(s, a).
         time_limit: seconds for all solves together; None for no limit.
+        served: (S, A) actions whose rows can be strict; the other rows count towards no margin. None for all.
     """
 
     def __init__(
-        self, mdp: TabularMDP, expert: Any, *, r_max: float, cap: float | None, on_states: bool, time_limit: float | None
+        self,
+        mdp: TabularMDP,
+        expert: Any,
+        *,
+        r_max: float,
+        cap: float | None,
+        on_states: bool,
+        time_limit: float | None,
+        served: ActionSets | None = None,
     ):
         self.whole, self.r_max, self.cap, self.on_states = mdp, r_max, cap, on_states
         self.until, self.time_limit = time.monotonic() + (time_limit or np.inf), time_limit
@@ -53,7 +63,7 @@ class PricedProgram:
         self.part = part = mdp.restrict(self.rows)
         self.comparisons = c = compare(part, np.asarray(expert)[self.rows])
         trivial = c.trivial & ~c.equal if on_states else np.zeros(c.states.size, dtype=bool)
-        self.usable = ~c.equal & ~trivial
+        self.usable = ~c.equal & ~trivial & (served is None or served[self.rows[c.states], c.actions])
         self.counted = self.usable & ~np.isin(c.states, c.states[trivial]) if cap is None else self.usable
         self.discounted = Discounted(part.P_pi(c.distribution), part.gamma)
         self.unit = (r_max if cap is None else min(r_max, cap)) / LARGE

@@ -31,7 +31,7 @@ class RewardSet(ABC):
 
     Args:
         posed: the reachable part of the MDP and its rows of (4).
-        served: (S,) states of which a margin is asked.
+        served: (S, A) actions over which a margin is asked.
         pins: known rewards, by state or by (state, action).
     """
 
@@ -78,7 +78,7 @@ class StateRewards(RewardSet):
         self.each: Sparse = sp.csr_array(picking(states, S) - part.gamma * following)  # (I - gamma P_a) V for each a
         moved = np.flatnonzero(~c.trivial)
         self.equal = c.equal[moved]
-        self.asked = posed.movable(True)[moved] & served[c.states[moved]]
+        self.asked = posed.movable(True)[moved] & served[c.states[moved], c.actions[moved]]
         none, k = np.zeros(self.closed.size, dtype=bool), self.opened.size
         self.counted = np.concatenate([none, self.asked, np.zeros(k * A, dtype=bool)])
         under = -picking(np.arange(k).repeat(A), k)
@@ -127,7 +127,7 @@ class StepRewards(RewardSet):
         acting = np.flatnonzero(~part.terminal)
         self.pairs = (acting[:, None] * A + np.arange(A)).ravel()
         self.taken = posed.taken.ravel()[self.pairs]
-        asked = (posed.known & served)[:, None] & ~posed.taken
+        asked = posed.known[:, None] & served & ~posed.taken
         self.counted = asked.ravel()[self.pairs]
         self.A: Sparse = sp.csr_array(picking(self.pairs // A, S) - part.gamma * part.P[self.pairs])
 

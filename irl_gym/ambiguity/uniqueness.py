@@ -19,7 +19,7 @@ from irl_gym._typing import Indices
 from irl_gym.ambiguity.extremes import Polytope, extremes
 from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.ambiguity.priced_rewards import PricedRewards
-from irl_gym.ambiguity.widths import served_states
+from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
 from irl_gym.errors import DegenerateExpert, InvalidParameter
 from irl_gym.learners.finite import FiniteLP
@@ -154,11 +154,11 @@ def _settled(mdp: TabularMDP, expert: Any, learner: FiniteLP, posed: Posed) -> t
         learner.fit(mdp, expert)  # says why
         raise DegenerateExpert("no state compares the expert with another action: every reward makes it optimal.")
     l1 = JUST_BELOW * learner.critical_l1(mdp, expert) if learner.l1 == "auto" else float(learner.l1)
-    cap = learner.margin_cap
-    if cap == "auto":
-        served, cap = served_states(learner, mdp, expert)
-        counted = counted & np.isin(posed.rows, served)[c.states]
-    return l1, cap, counted
+    if learner.margin_cap is None:
+        return l1, None, counted
+    served, cap = served_actions(learner, mdp, expert)
+    counted = counted & served[posed.rows[c.states], c.actions]
+    return l1, cap if learner.margin_cap == "auto" else learner.margin_cap, counted
 
 
 def _kept(polytope: Polytope, vertex: Vertex, tolerance: float) -> Polytope:

@@ -3,8 +3,8 @@
 The feasible set (Ng & Russell 2000, (4)) is a cone: with R it holds 2 R, and 0. Without an anchor every width is infinite or
 says nothing, so the set is cut in two places:
     |R| <= R_max           the scale
-    margins >= tau         in every state that can have one; tau > 0 keeps out R = 0 and all that ties the expert with others
-tau is half of the largest margin that all states can have at once, as in `FiniteLP(margin_cap="auto")`: the set is then that of
+    margins >= tau         in every row that can be strict; tau > 0 keeps out R = 0 and all that ties the expert with others
+tau is half of the largest margin that all these can have at once, as in `FiniteLP(margin_cap="auto")`: the set is then that of
 all optima of the capped program as l1 goes to 0, before the norm chooses among them. What `FiniteLP()` learns lies in it.
 `margin=None` asks for (4) alone, `pinned` for rewards that are known, such as a goal's.
 
@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym._typing import Indices
+from irl_gym._typing import ActionSets, Indices
 from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.ambiguity.reward_sets import RewardSet, StateRewards, StepRewards
 from irl_gym.checks import checked_number
@@ -36,8 +36,6 @@ Pins = Mapping[Any, float]
 """State, or (state, action), -> its reward."""
 NAMED = 5
 """Pins that an error names."""
-AT_THE_CAP = 0.5
-"""A margin above this times the cap is at it, as in `FiniteLP`; those of states that cannot have one are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +103,8 @@ def feasible_widths(
         mdp: only states reachable from d0 have a width; the others' is NaN.
         expert: (S,) actions, (S, A) probabilities or (S, A) set; rows of NaN where nothing is known: no rows there.
         r_max: the bound on |R|.
-        margin: tau, what the expert is at least better by, in units of value, in every state that can have a margin. "auto"
-            is half of the largest that all can have at once, given the pins; None or 0 asks for (4) alone.
+        margin: tau, what the expert is at least better by, in units of value, than every action that it can be better than.
+            "auto" is half of the largest that all can have at once, given the pins; None or 0 asks for (4) alone.
         reward_on: "state" for R(s) paid on arrival, "state-action" for R(s, a).
         pinned: rewards that are known: state -> value, or (state, action) -> value.
         workers: processes; the same bytes with any number. More than one are spawned, so a script needs the usual
@@ -126,10 +124,11 @@ def feasible_widths(
     posed = pose(mdp, expert)
     kind: type[RewardSet] = StateRewards if reward_on == "state" else StepRewards
     pins = _checked_pins({} if pinned is None else pinned, posed, mdp, reward_on, r_max)
-    with_margin, tau = np.zeros(0, dtype=np.int64), 0.0
+    served, tau = np.zeros((mdp.n_states, mdp.n_actions), dtype=bool), 0.0
     if margin:
-        with_margin, tau = served_states(learner, mdp, expert)
-    the_set = kind(posed, np.isin(posed.rows, with_margin), pins)
+        served, tau = served_actions(learner, mdp, expert)
+    with_margin = np.flatnonzero(served.any(axis=1))
+    the_set = kind(posed, served[posed.rows], pins)
     if margin == "auto" and pins:
         tau = _half_of_largest(the_set, pinned, r_max, time_limit)
     elif margin and margin != "auto":
@@ -150,15 +149,14 @@ def feasible_widths(
     )
 
 
-def served_states(learner: FiniteLP, mdp: TabularMDP, expert: Any) -> tuple[Indices, float]:
-    """The states that can have a margin at all, and half of the largest that all of them can have at once.
+def served_actions(learner: FiniteLP, mdp: TabularMDP, expert: Any) -> tuple[ActionSets, float]:
+    """(S, A) actions that the expert can be better than, and half of the largest margin over all of them at once.
 
     Raises:
         DegenerateExpert: there are none.
     """
     certificate = replace(learner, l1=0.0, margin_cap="auto").fit(mdp, expert).certificate
-    tau = certificate.margin_cap or 0.0
-    return np.flatnonzero(certificate.margin > AT_THE_CAP * tau), tau
+    return certificate.served(mdp.n_actions), certificate.margin_cap or 0.0
 
 
 def _half_of_largest(the_set: RewardSet, pinned: Any, r_max: float, time_limit: float | None) -> float:

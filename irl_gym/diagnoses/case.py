@@ -255,12 +255,7 @@ class Case:
         """(S, A) rows of (4) that some reward makes strict; None where that is not known."""
         if self.best is None or isinstance(self.best, DegenerateExpert):
             return None
-        certificate = self.best.certificate
-        possible = (np.nan_to_num(certificate.margin) > certificate.margin_cap / 2)[:, None].repeat(
-            self.distribution.shape[1], axis=1
-        )
-        possible[tuple(certificate.unbreakable_rows.T)] = False
-        return possible
+        return self.best.certificate.served(self.distribution.shape[1])
 
     @cached_property
     def best(self) -> IRLResult | DegenerateExpert | None:

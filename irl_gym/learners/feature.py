@@ -11,9 +11,13 @@ row says 0, so that its state's min is at most 0 whatever the reward, and the op
 
 `margin_cap=tau` Departs: each margin counts up to tau only. The paper's sum buys one state's margin at the price of others',
 and pays for violations with large margins elsewhere, also where the features express a reward that makes the expert optimal.
-`margin_cap="auto"`: tau is half of the largest margin that all rows can have at once, where there is one: it is then attained
-by all, and the expert is strictly optimal in S_0. Where there is none, a tenth of the mean margin under the paper's reward;
-and if the features still express a reward that makes the expert optimal, violations cost 1000-fold, so that none is left.
+Rows that no such reward in the span makes strict are left out of the margins one by one, never their whole state; what violates
+them still costs. They are rows of S_0: weights that satisfy (10) in all of S_0 tie the expert with these actions, where other
+features, or a smaller S_0, may not. Of a generative model that holds of the rows as estimated. Where the features express no
+reward that makes the expert optimal, no row is left out.
+`margin_cap="auto"`: tau is half of the largest margin that all other rows can have at once: with l1 = 0 it is attained by each
+of them, so that the expert is optimal in S_0, and strictly but for the rows left out. Where the features express no reward that
+makes the expert optimal, a tenth of the mean margin under the paper's reward.
 
 Departs: an action that the expert takes too, when it takes several, has to be as good; its rows d and -d both go into the sum,
 where they cost (penalty - 1) |d|. The certificate judges all reachable states of a table, not the sample only.
@@ -33,18 +37,15 @@ from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
+from irl_gym.learners.feature_program import NOTHING, SolvedFeatures, solve_features
 from irl_gym.learners.feature_rows import FeatureRows, chosen_states, completed, rows_of_model, rows_of_table
-from irl_gym.learners.weights import Rows, Weights, best_weights, most_agreement, uniform_margin
+from irl_gym.learners.weights import Weights
 from irl_gym.linear_reward import LinearReward
+from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import Policy
-from irl_gym.solvers import SolverName, Status
+from irl_gym.solvers import SolverName
 from irl_gym.states import States
-
-EXACT = 1e3
-"""Slope of p below 0 at which "auto" lets nothing pay for a violation that need not be."""
-NOTHING = 1e-8
-"""An objective or a sum of margins below this, over the size of the rows, is the solvers' rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +144,11 @@ class FeatureLP:
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted, printed=self.trivial_rows == "as printed")
-        solved = self._solve(found)
+        solved = solve_features(self, found)
         weights = solved.weights
         reward = self._reward(weights)
-        judged = judge_table(mdp, expert, known, reward.tabular(mdp.n_states if states is None else states))
+        tabular = reward.tabular(mdp.n_states if states is None else states)
+        judged = judge_table(mdp, expert, known, tabular, found.pairs(solved.ties))
         certificate = self._certificate(found, solved, judged, None)
         return IRLResult(reward, solved.status, certificate.objective, certificate, self._stats(weights, found))
 
@@ -167,19 +169,21 @@ class FeatureLP:
             seed=int(self.seed),
             printed=self.trivial_rows == "as printed",
         )
-        solved = self._solve(found)
+        solved = solve_features(self, found)
         weights = solved.weights
-        margin, tolerance, error = np.full(len(S_0), np.nan), np.full(len(S_0), 1e-9 * found.rows.scale), None
-        margin[found.states] = found.rows.least(weights.alpha)
+        tolerance, error, short = np.full(len(S_0), 1e-9 * found.rows.scale), None, np.zeros(len(S_0))
+        values, free = found.rows.d @ weights.alpha, ~solved.ties
+        margin = least_per_state(values[free], found.row_states[free], len(S_0))
+        short[found.states] = np.maximum(-found.rows.least(weights.alpha), 0.0)
         if found.batches is not None:
             spread = (found.batches @ weights.alpha).std(axis=0, ddof=1) / np.sqrt(len(found.batches))
             error = float(spread.max())
             tolerance[found.states] += 2 * spread[found.rows.active(weights.alpha, 1.0)[0]]
         judged = Judged(
             margin,
-            np.zeros(len(S_0)),
+            short,
             tolerance,
-            bool(np.abs(found.rows.d @ weights.alpha).max() <= NOTHING * found.rows.scale),
+            bool(np.abs(values).max() <= NOTHING * found.rows.scale),
             None,
         )
         certificate = self._certificate(found, solved, judged, error)
@@ -211,59 +215,28 @@ class FeatureLP:
             )
         return states
 
-    def _solve(self, found: FeatureRows) -> "_Solved":
-        """The weights, what became of them, and whether some reward of the span satisfies (10)."""
-        rows, unit = found.rows, NOTHING * found.rows.scale
-        solving: dict[str, Any] = {"solver": self.solver, "time_limit": self.time_limit}
-        program: dict[str, Any] = {"slope": float(self.penalty), "l1": float(self.l1), "cap": np.inf}
-        cap, expressible = None if self.margin_cap == "auto" else self.margin_cap, None
-        if self.margin_cap == "auto":
-            uniform = uniform_margin(rows, **solving)
-            cap = uniform / 2 if uniform > 0 else self._typical_margin(rows, program, solving)
-            expressible = uniform > 0 or most_agreement(rows, **solving) > NOTHING
-            if expressible and not uniform > 0:
-                program["slope"] = max(program["slope"], EXACT)
-        program["cap"] = np.inf if cap is None else float(cap)
-        weights = best_weights(rows, **program, **solving)
-        if expressible is None:
-            least = rows.least(weights.alpha)
-            satisfied = bool(least.min() >= -unit and least.max() > unit)
-            expressible = satisfied or most_agreement(rows, weights.alpha, **solving) > NOTHING
-        bound = rows.bound(weights.y, **program)
-        if bound <= min(unit, np.inf if cap is None else NOTHING * cap):
-            weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
-        status = weights.answer.status
-        if not expressible:
-            status = Status.INEXPRESSIBLE
-        elif not weights.alpha.any():
-            status = Status.ZERO_WEIGHTS
-        slope, cap = program["slope"], None if cap is None else float(cap)
-        return _Solved(weights, status, expressible, slope, cap, rows.objective(weights.alpha, **program), bound)
-
-    def _typical_margin(self, rows: Rows, program: dict[str, Any], solving: dict[str, Any]) -> float | None:
-        """A tenth of the mean margin under the paper's reward; None where it is 0."""
-        mean = float(np.maximum(rows.least(best_weights(rows, **program, **solving).alpha), 0.0).mean())
-        return mean / 10 if mean > NOTHING * rows.scale else None
-
     def _reward(self, weights: Weights) -> LinearReward:
         return LinearReward(weights.alpha, self.phi, {"learner": "FeatureLP", "scaling": self.phi.scaling})
 
-    def _certificate(self, found: FeatureRows, solved: "_Solved", judged: Judged, error: float | None) -> FeatureCertificate:
+    def _certificate(
+        self, found: FeatureRows, solved: SolvedFeatures, judged: Judged, error: float | None
+    ) -> FeatureCertificate:
         rows, alpha = found.rows, solved.weights.alpha
-        short = np.maximum(np.nan_to_num(-judged.margin), judged.tied)
-        violated = np.flatnonzero(short > judged.tolerance)
+        violated, pairs = np.flatnonzero(judged.short > judged.tolerance), found.pairs(solved.ties)
         loss = judged.loss
         return FeatureCertificate(
             expert_optimal=not violated.size if loss is None else loss.optimal,
             loss_low=None if loss is None else loss.low,
             loss_bound=None if loss is None else loss.high,
             loss_share=None if loss is None else loss.share,
-            worst_violation=float(np.maximum(short, 0.0).max(initial=0.0)),
+            worst_violation=float(judged.short.max(initial=0.0)),
             margin=judged.margin,
             violated=violated,
+            unbreakable=np.unique(pairs[:, 0]),
+            unbreakable_rows=pairs,
             objective=solved.objective,
             dual_bound=solved.bound,
-            penalty=solved.slope,
+            penalty=float(self.penalty),
             margin_cap=solved.cap,
             l1=float(self.l1),
             alpha_l1_norm=float(np.abs(alpha).sum()),
@@ -279,19 +252,6 @@ class FeatureLP:
 
     def _stats(self, weights: Weights, found: FeatureRows) -> dict[str, Any]:
         return {"programs": {"weights": weights.answer.to_json()}, "rows": len(found.rows.groups)}
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """The program's answer, and what is said of it."""
-
-    weights: Weights
-    status: Status
-    expressible: bool
-    slope: float
-    cap: float | None
-    objective: float
-    bound: float
 
 
 def _rows(rows: np.ndarray) -> np.ndarray:

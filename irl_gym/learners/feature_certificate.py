@@ -37,9 +37,14 @@ class FeatureCertificate(Proven):
     worst_violation: float
     """The largest violation of (4), in units of value; 0 when none."""
     margin: np.ndarray
-    """(S,) smallest margin of the expert over another action, NaN where there is none; (|S_0|,) of a generative model."""
+    """(S,) smallest margin of the expert over another action, over the rows not listed as unbreakable; NaN where there is none;
+    (|S_0|,) of a generative model."""
     violated: Indices
     """States, rows of the table or numbers in S_0, in which another action is better than the expert's."""
+    unbreakable: Indices
+    """States of S_0 with a row of (10) that no weights that satisfy (10) in all of S_0 make strict, as a program found."""
+    unbreakable_rows: np.ndarray
+    """(u, 2) state and action of each such row: left out of `margin`, one by one. Without a cap no program asks: empty."""
     objective: float
     """sum over S_0 of p(margin), minus l1 ||alpha||_1, recomputed."""
     dual_bound: float
@@ -94,6 +99,9 @@ class FeatureCertificate(Proven):
             lines.append(f"violated                 (4) in {self.violated.size} states, by at most {self.worst_violation:.2e}")
         if not self.expressible:
             lines.append("expressible              no reward in the span of the features makes the expert optimal")
+        if self.unbreakable.size:
+            count, states = len(self.unbreakable_rows), self.unbreakable.size
+            lines.append(f"unbreakable              {count} rows of (10), in {states} states, that no such weights make strict")
         if self.degenerate:
             lines.append(f"degenerate               {'R is zero' if self.zero else 'R ties the expert with every action'}")
         if self.standard_error is not None:
@@ -106,9 +114,9 @@ class Judged:
     """The margins of a reward, and what rounding or noise leaves of them."""
 
     margin: np.ndarray
-    """Smallest margin of each state; NaN where there is none."""
-    tied: np.ndarray
-    """The largest difference between actions that the expert takes in a state; 0 where it takes one."""
+    """Smallest margin of each state, over the rows that count; NaN where there is none."""
+    short: np.ndarray
+    """By what the expert's action is worse than the best in each state, or differs from another that it takes; at least 0."""
     tolerance: float | np.ndarray
     """A violation below this is none; one number, or one for each state."""
     indifferent: bool
@@ -117,17 +125,21 @@ class Judged:
     """What the best policy earns more; None where there is no table."""
 
 
-def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: TabularReward) -> Judged:
-    """Margins (S,) under a reward (S,) of every reachable state in which the expert is known."""
+def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: TabularReward, ties: np.ndarray) -> Judged:
+    """Margins (S,) under a reward (S,) of every reachable state in which the expert is known.
+
+    `ties` (u, 2) are states and actions that no margin is taken over.
+    """
     rows = np.flatnonzero(mdp.reachable)
     part, distribution = mdp.restrict(rows), as_distribution(expert, mdp.n_states, mdp.n_actions)[rows]
     found, seen = optimum(part, reward.of_rows(rows)), known[rows] | part.terminal
     c = compare(part, distribution, np.flatnonzero(seen))
     margins = margins_of(found, c)
-    per_state = np.full((3, mdp.n_states), np.nan)
-    per_state[0, rows] = least_per_state(margins.values[~c.equal], c.states[~c.equal], part.n_states)
-    per_state[1, rows] = -least_per_state(-np.abs(margins.values[c.equal]), c.states[c.equal], part.n_states)
-    per_state[2, rows] = -least_per_state(-margins.none, c.states, part.n_states)
-    margin, tied, none = per_state
+    left_out = np.isin(rows[c.states] * mdp.n_actions + c.actions, ties @ [mdp.n_actions, 1])
+    kept = ~c.equal & ~left_out
+    margin, short, none = np.full((3, mdp.n_states), np.nan)
+    margin[rows] = least_per_state(margins.values[kept], c.states[kept], part.n_states)
+    short[rows] = -least_per_state(-margins.violations(c.equal), c.states, part.n_states)
+    none[rows] = -least_per_state(-margins.none, c.states, part.n_states)
     indifferent = bool((np.abs(margins.values) <= margins.none).all())
-    return Judged(margin, np.nan_to_num(tied), np.nan_to_num(none), indifferent, loss_of(found, distribution, ~seen))
+    return Judged(margin, np.nan_to_num(short), np.nan_to_num(none), indifferent, loss_of(found, distribution, ~seen))

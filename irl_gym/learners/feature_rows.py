@@ -36,10 +36,41 @@ class FeatureRows:
     """d, grouped by state."""
     states: np.ndarray
     """(G,) state of each group: its row in the table, or its number in S_0."""
+    actions: np.ndarray
+    """(n,) action of each row."""
+    equal: np.ndarray
+    """(n,) the expert takes this action too: the row is one of a pair d and -d."""
+    idle: np.ndarray
+    """(n,) rows of actions with the expert's successors, which the program as printed keeps: 0 whatever the reward."""
     trivial: int
     """States of S_0 without a row, or with none that a reward on states can move: not counted."""
     batches: np.ndarray | None = None
     """(b, n, K) d by parts of the rollouts; None where exact or with one rollout."""
+
+    @property
+    def row_states(self) -> np.ndarray:
+        """(n,) state of each row."""
+        return self.states[self.rows.groups]
+
+    def pairs(self, which: np.ndarray) -> np.ndarray:
+        """(k, 2) state and action of some rows (n,)."""
+        return np.stack([self.row_states[which], self.actions[which]], axis=1).astype(np.int64)
+
+    def apart(self, ties: np.ndarray) -> Rows:
+        """The rows of the program that leaves some (n,) out of margins, one by one.
+
+        Those of a state are a group of their own, with a row of 0: it earns nothing, and what violates it costs as before.
+        """
+        if not ties.any():
+            return self.rows
+        d, groups = self.rows.d, self.rows.groups
+        others, first = np.unique(groups[~ties], return_inverse=True)
+        theirs, second = np.unique(groups[ties], return_inverse=True)
+        second = others.size + second
+        numbers = np.concatenate([first, second, others.size + np.arange(theirs.size)])
+        order = np.argsort(numbers, kind="stable")
+        zeros = np.zeros((theirs.size, d.shape[1]))
+        return Rows(np.concatenate([d[~ties], d[ties], zeros])[order], numbers[order])
 
 
 def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
@@ -150,6 +181,7 @@ def rows_of_table(
 def _grouped(comparisons: Comparisons, kept: np.ndarray, d: np.ndarray, S_0: np.ndarray) -> FeatureRows:
     """Rows by state; those that are equalities twice, in groups of their own."""
     states, equal = comparisons.states[kept], comparisons.equal[kept]
+    order = np.concatenate([np.flatnonzero(~equal), np.repeat(np.flatnonzero(equal), 2)])
     named, groups = np.unique(states[~equal], return_inverse=True)
     counted = np.unique(states).size
     both = np.repeat(states[equal], 2)
@@ -157,7 +189,14 @@ def _grouped(comparisons: Comparisons, kept: np.ndarray, d: np.ndarray, S_0: np.
     mirrored[1::2] *= -1
     groups = np.concatenate([groups, named.size + np.arange(both.size)])
     d = np.concatenate([d[~equal], mirrored]) if both.size else d
-    return FeatureRows(Rows(d, groups), np.concatenate([named, both]), int(S_0.size - counted))
+    return FeatureRows(
+        Rows(d, groups),
+        np.concatenate([named, both]),
+        comparisons.actions[kept][order],
+        equal[order],
+        comparisons.trivial[kept][order],
+        int(S_0.size - counted),
+    )
 
 
 def rows_of_model(
@@ -208,7 +247,9 @@ def rows_of_model(
             f"no other action leads from the {len(S_0)} states of S_0 to other features than the expert's: nothing can be "
             "learned from them. Choose a larger S_0 or other features."
         )
-    moved = moved | printed
-    named, groups = np.unique(s[moved], return_inverse=True)
-    d = np.average(batches[:, moved], axis=0, weights=sizes)
-    return FeatureRows(Rows(d, groups), named, len(S_0) - named.size, batches[:, moved] if parts > 1 else None)
+    kept = moved | printed
+    named, groups = np.unique(s[kept], return_inverse=True)
+    d = np.average(batches[:, kept], axis=0, weights=sizes)
+    rows = Rows(d, groups)
+    never, parted = np.zeros(len(d), dtype=bool), batches[:, kept] if parts > 1 else None
+    return FeatureRows(rows, named, a[kept], never, ~moved[kept], len(S_0) - named.size, parted)

@@ -145,7 +145,9 @@ class FiniteLP:
         """
         expert, known = completed(expert, mdp.n_states)
         if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
-            return PartialTask(self, mdp, expert, known, None).lambda_0()
+            partial = PartialTask(self, mdp, expert, known, None)
+            partial.settle()
+            return partial.lambda_0()
         task = _Task(self, mdp, expert)
         if self.margin_cap is not None:
             task.uniform_margin()

@@ -1,9 +1,10 @@
 """FiniteLP for an expert that is known in some states only, or that errs: which programs are solved, and in which order.
 
-The programs are those of `soft`. The cap "auto" is half of the largest margin that all rows can have at once, but those
-that no reward makes strict. Where the data
-contradict themselves no such margin exists, and with slack the states are found first whose rows it is best to give up: those
-violated when margins count up to R_max / 1000. The margin is then of the others, and all rows return to the last program.
+The programs are those of `soft`. With a cap, rows that no reward makes strict are left out one by one (`strict_rows`): they
+count towards no margin, and are priced as other rows are. The cap "auto" is half of the largest margin that the rows which
+count can have at once. Where the data contradict themselves no such margin exists, and with slack the states are found first
+whose rows it is best to give up: those violated when margins count up to R_max / 1000. What can be strict, and by how much, is
+then asked of the others, and the rows given up return to the last program.
 With l1 = 0 the reward is the limit l1 -> 0+: the least N with the margins of the best reward. That also sends states to avoid
 as low as these margins allow. Axes: S states, A actions, n rows of (4).
 """
@@ -91,13 +92,10 @@ class PartialTask:
     def fit(self) -> IRLResult[TabularReward, Certificate]:
         """Learn the reward."""
         learner, r_max = self.learner, self.learner.r_max
+        cap, need = self.settle()
         wanted = learner.l1 == "auto" or learner.l1 > 0 or learner.report_lambda_0
         lambda_0 = self.lambda_0() if wanted and (learner.l1 == "auto" or not self.partly.avoided.any()) else None
         l1 = JUST_BELOW * lambda_0 if learner.l1 == "auto" and lambda_0 is not None else float(learner.l1)
-        if learner.margin_cap == "auto":
-            cap, need = self.cap()
-        else:
-            cap, need = learner.margin_cap, None
         if l1 > 0:
             unit = r_max
             found = self.recorded("reward", self.program(soft=True).best(1.0, None if cap is None else cap / r_max, l1))
@@ -146,6 +144,19 @@ class PartialTask:
             raise self.degenerate()
         return found.objective
 
+    def settle(self) -> tuple[float | None, np.ndarray | None]:
+        """The cap, and what `cap` says that the rows need; leaves in `counted` the rows that count.
+
+        Raises:
+            DegenerateExpert: the cap is "auto", and no row can be strict.
+        """
+        if self.learner.margin_cap == "auto":
+            return self.cap()
+        if self.learner.margin_cap is not None:
+            with suppress(DegenerateExpert):  # no row can be strict where slack buys nothing: then none is left out
+                self.cap()
+        return self.learner.margin_cap, None
+
     def cap(self) -> tuple[float, np.ndarray | None]:
         """Half of the largest uniform margin, and what the rows need where no row has to be given up, in units of the cap."""
         c, hard = self.partly.comparisons, self.program(soft=False)
@@ -163,13 +174,14 @@ class PartialTask:
             if not hard.counted.any():
                 raise self.degenerate()
             served = strict_rows(c.states, hard.counted, lambda rows: self._serve(given_up, rows))
+            if not served.any():
+                raise self.degenerate()
             unbreakable = hard.counted & ~served
             self.stats["rows_without_margin"] = int(unbreakable.sum())
             need[unbreakable] = 0.0
-            if not given_up.any():  # else they depend on what was given up
-                self.counted, self.unbreakable = self.counted & served, unbreakable
+            self.counted, self.unbreakable = self.counted & ~unbreakable, unbreakable
             rounds = self.partly.mdp.n_actions
-            bound = self._uniform(hard, need, (2 * rounds + 1) * LARGEST_BOUND) if served.any() else None
+            bound = self._uniform(hard, need, (2 * rounds + 1) * LARGEST_BOUND)
             if bound is None:
                 raise self.degenerate()
         self.stats["uniform_margin"] = self.learner.r_max / bound

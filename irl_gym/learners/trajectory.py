@@ -29,8 +29,9 @@ from irl_gym.features import FeatureMap, as_features, checked_features
 from irl_gym.generative import least_horizon, truncation_bound
 from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.estimates import Estimate, nearest, usable
+from irl_gym.learners.expressible import uniform_margin
 from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
-from irl_gym.learners.weights import Rows, Weights, best_weights, uniform_margin
+from irl_gym.learners.weights import Rows, Weights, best_weights
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
 from irl_gym.solvers import SolverName, Status

@@ -12,9 +12,7 @@ In section 4 a group is a state and its rows are its actions; in section 5 a gro
 is above every objective, whatever the solver did. Axes: K features, n rows, G groups.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 import cvxpy as cp
@@ -210,87 +208,9 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, box: np.ndarra
     answer = solve(problem, rows=n, solver=solving.solver, time_limit=solving.time_limit)
     y = np.zeros(len(rows.groups))
     y[kept] = above.dual_value
-    return Weights(np.clip(_value(alpha), *box), y, answer)
+    return Weights(np.clip(value_of(alpha), *box), y, answer)
 
 
-def most_agreement(
-    rows: Rows, near: np.ndarray | None = None, *, solver: SolverName = "auto", time_limit: float | None = None
-) -> float:
-    """A bound above the mean of d . alpha, over scale, of all rewards that leave *no* row below 0.
-
-    Where it is 0, to rounding, the features express no reward that makes the expert optimal, but those that leave it tied with
-    everything. The rows that bind are generated, first those worst under `near` (K,): each program is a relaxation, so its
-    bound holds for the whole.
-
-    Raises:
-        SolverTimeout, SolverFailed: no answer.
-    """
-    d = rows.d / rows.scale
-    mean = d.mean(axis=0)
-
-    def solve_part(part: np.ndarray) -> tuple[float, float, np.ndarray]:
-        alpha = cp.Variable(len(mean))
-        satisfied: Any = d[part] @ alpha >= 0
-        problem = cp.Problem(cp.Maximize(mean @ alpha), [satisfied, alpha <= 1, alpha >= -1])
-        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
-        y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
-        return float(np.abs(mean + y @ d[part]).sum()), 0.0, _value(alpha)
-
-    return _generate(d, np.sign(mean) if near is None else near, solve_part)
-
-
-def uniform_margin(rows: Rows, *, solver: SolverName = "auto", time_limit: float | None = None) -> float:
-    """The largest margin that every row can have at once, 0 if there is none; rows that are 0 themselves are left out.
-
-    Raises:
-        SolverTimeout, SolverFailed: no answer.
-    """
-    d = rows.d / rows.scale
-    d = d[np.abs(d).max(axis=1) > ROUNDING]
-    if not len(d):
-        return 0.0
-
-    def solve_part(part: np.ndarray) -> tuple[float, float, np.ndarray]:
-        alpha, margin = cp.Variable(d.shape[1]), cp.Variable()
-        problem = cp.Problem(cp.Maximize(margin), [d[part] @ alpha >= margin, alpha <= 1, alpha >= -1])
-        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
-        return float(np.asarray(margin.value)), float(np.asarray(margin.value)), _value(alpha)
-
-    found = _generate(d, np.sign(d.mean(axis=0)), solve_part)
-    return found * rows.scale if found > 1e-7 else 0.0  # below, it is the solvers' rounding
-
-
-def _generate(d: np.ndarray, alpha: np.ndarray, solve_part: Callable[[np.ndarray], tuple[float, float, np.ndarray]]) -> float:
-    """The value of the last of a series of relaxations, each with the rows put in that the answer before violates most.
-
-    Rows that are far from binding leave again, but for the last of many rounds, so that the programs stay small.
-
-    Args:
-        d: (n, K).
-        alpha: (K,) before the first.
-        solve_part: (n,) rows that are in, to the program's value, what every row has to reach, and alpha.
-    """
-    part = np.zeros(len(d), dtype=bool)
-    values, least, value = d @ alpha, np.inf, 0.0
-    for number in count():
-        worst = np.argsort(np.where(part, np.inf, values), kind="stable")[: max(1, SAMPLE // 2)]
-        worst = worst[(values[worst] < least - 1e-9) & ~part[worst]]
-        if not worst.size:
-            return value
-        if number < MOST_PURGES:
-            kept = np.argsort(np.where(part, values, np.inf), kind="stable")[:SAMPLE]
-            part &= np.isin(np.arange(len(d)), kept)
-        part[worst] = True
-        value, least, alpha = solve_part(part)
-        if value <= 1e-9:
-            return value
-        values = d @ alpha
-    return value
-
-
-MOST_PURGES = 50
-"""Rounds after which rows that are in stay in, so that the series ends."""
-
-
-def _value(variable: cp.Variable) -> np.ndarray:
+def value_of(variable: cp.Variable) -> np.ndarray:
+    """What a solved program gives a variable."""
     return np.asarray(variable.value, dtype=np.float64)

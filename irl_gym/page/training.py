@@ -162,8 +162,8 @@ def widths(scene: Scene) -> Section:
         return Section("widths", title, "No state's reward is bounded by what the expert does.")
     lead = (
         f"Considered are all rewards within +-{number(_largest_reward(scene.run))} under which the expert is optimal with a "
-        f"margin of at least {_least_margin(scene.run)} in every state that can have one. The width is how far a state's "
-        "reward can move among them: 0 says that the expert settles it, a wide one that almost anything goes."
+        f"margin of at least {_least_margin(scene.run)} over every action that it can be better than. The width is how far a "
+        "state's reward can move among them: 0 says that the expert settles it, a wide one that almost anything goes."
     )
     made = [of_states("widths-map", "Feasible width", width, scene, f"Widths {spread(width[shown])}.{of_steps}",
                       scale=panels.WIDTHS, centred=False, shown=shown, unit="width")]  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from models import Model, episodic_model, models, paper_grid, random_model, ring
 
-from irl_gym.ambiguity.lambda_path import LambdaPath, lambda_path
+from irl_gym.ambiguity.lambda_path import ARRAYS, LambdaPath, lambda_path
 from irl_gym.certificate import certify
 from irl_gym.errors import (
     DegenerateExpert,
@@ -18,6 +18,7 @@ from irl_gym.errors import (
     SolverTimeout,
 )
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.rewards import write_archive
 
 GRID = paper_grid()
 
@@ -221,7 +222,7 @@ def test_path_takes_an_expert_unknown_only_where_nothing_is_done(grid):
 
 def test_time_limit_says_what_to_do():
     with pytest.raises(SolverTimeout, match="raise time_limit, or give most_pieces"):
-        lambda_path(GRID.mdp, GRID.expert, time_limit=1e-6)
+        lambda_path(GRID.mdp, GRID.expert, time_limit=1e-9)
 
 
 @pytest.mark.parametrize("settings", [{"r_max": 0}, {"margin_cap": -1.0}, {"most_pieces": 1}, {"time_limit": 0}])
@@ -243,6 +244,15 @@ def test_price_below_zero_is_refused(grid):
 def test_saved_path_is_read_back(grid, tmp_path):
     grid.save(tmp_path / "path.npz")
     assert LambdaPath.load(tmp_path / "path.npz").to_json() == grid.to_json()
+
+
+def test_a_file_from_before_violations_were_noted_proves_nothing(grid, tmp_path):
+    arrays = {name: getattr(grid, name) for name in ARRAYS}
+    numbers = {name: getattr(grid, name) for name in ("gap", "exact", "r_max", "margin_cap", "solves")}
+    write_archive(tmp_path / "path.npz", {"format": LambdaPath.FORMATS[0], **numbers}, arrays)
+    old = LambdaPath.load(tmp_path / "path.npz")
+    assert grid.exact and np.isnan(old.violation) and not old.exact
+    assert "not certified" in str(old) and old.to_json()["violation"] is None
 
 
 def test_load_names_both_kinds_when_the_file_holds_a_reward(grid, tmp_path):

@@ -7,7 +7,9 @@ from models import paper_grid
 from patients import finding, judged, names, partly_contradicted
 
 from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.mdp import TabularMDP
 
 GRID = paper_grid()
 CAPPED = ("--margin-cap auto", "--l1 0")
@@ -61,6 +63,15 @@ def test_ties_that_no_state_reward_breaks_are_told():
     mdp = partly_contradicted()
     said = finding("unbreakable-ties", FiniteLP().fit(mdp, ZERO), mdp, ZERO)
     assert said.states.tolist() == [0, 3] and said.actions == (1, 1)
+
+
+def test_ties_that_only_other_features_break_ask_for_features():
+    A, B, C, D = np.eye(4)
+    mdp = TabularMDP.from_dense(np.array([[B, C, D], [B, B, B], [C, C, C], [D, D, D]]), 0.9, A)
+    found = FeatureLP(np.array([[0.0], [0.0], [0.0], [1.0]]), margin_cap="auto").fit(mdp, ZERO[:4])
+    said = finding("avoidable-ties", found, mdp, ZERO[:4])
+    assert found.certificate.unbreakable_rows.tolist() == [[0, 1]] and found.certificate.margin[0] > 0
+    assert (said.states.tolist(), said.actions) == ([0], (1,)) and said.flags == ("--features",)
 
 
 def test_a_reward_on_steps_mends_unbreakable_ties():

@@ -195,9 +195,10 @@ def test_a_potential_in_single_precision_has_no_distance(name):
 @pytest.mark.parametrize("rows", [1, 7, 1000])
 def test_how_many_transitions_are_evaluated_at_once_changes_nothing(rows, monkeypatch):
     a, b = map(function, rewards_of(ENDING))
-    whole = estimate("epic", ENDING, 0, a, b)
+    transitions, fresh, _ = drawn(ENDING, 0, n=200, m=50)
+    whole = sampled_epic(a, b, transitions, fresh)
     monkeypatch.setattr("irl_gym.distances.sampled.ROWS", rows)
-    assert estimate("epic", ENDING, 0, a, b) == whole
+    assert sampled_epic(a, b, transitions, fresh) == whole
 
 
 def test_few_fresh_draws_make_a_larger_error():

@@ -59,7 +59,8 @@ def test_enumeration_finds_the_table_that_an_environment_publishes(name):
     known = published_table(env, 0.99)
     assert known is not None
     # Ours draw from sums over many rows of their table: their rounding is that of numbers as large as the number of rows.
-    assert_same_mdp(table_of(env), known, 1e-13 if "irl_gym" in env_id else 1e-15)
+    seen = {"revisits": 0} if env_id == "Taxi-v4" else {}  # what is hidden is looked for in smaller ones
+    assert_same_mdp(table_of(env, **seen), known, 1e-13 if "irl_gym" in env_id else 1e-15)
 
 
 def test_enumeration_of_draws_is_exact_and_says_so():
@@ -95,7 +96,7 @@ class Dealt(gym.ObservationWrapper):
 def test_enumeration_of_blackjack_with_the_dealer_shown_agrees_with_the_table_of_its_deck():
     known = blackjack_table(gym.make("Blackjack-v1", sab=False, natural=False), 0.99)
     assert known is not None
-    found = table_of(Dealt(BlackjackEnv(sab=False, natural=False)))
+    found = table_of(Dealt(BlackjackEnv(sab=False, natural=False)), revisits=0)
     rows = [found.states.encode((16, 10, 0, card)) for card in range(1, 11)]  # resets are counted: four cards and a suit
     chances = np.array([1 / 13] * 9 + [4 / 13])
     row = known.states.encode((16, 10, 0))
@@ -111,7 +112,7 @@ def test_enumeration_of_fickle_taxi_says_what_to_reveal():
 def fickle():
     jaxtyping.config.update("jaxtyping_disable", True)
     env = Reveal(gym.make("Taxi-v4", fickle_passenger=True))
-    return env, table_of(env)
+    return env, table_of(env, revisits=0)
 
 
 def test_enumeration_of_revealed_fickle_taxi_has_the_change_of_mind(fickle):

@@ -70,14 +70,24 @@ def test_physics_vector_env_observations_are_in_its_space():
     assert vector.observation_space.contains(vector.step(vector.action_space.sample())[0])
 
 
-def test_physics_vector_env_makes_a_million_steps_a_second():
-    vector = make(num_envs=5000)
-    vector.reset(seed=0)
-    actions = np.random.default_rng(0).integers(3, size=5000)
-    began = time.perf_counter()
-    for _ in range(100):
-        vector.step(actions)
-    assert 500_000 / (time.perf_counter() - began) > 1e6
+@pytest.mark.slow
+def test_physics_vector_env_steps_5000_copies_in_the_time_of_50_single_steps():
+    def steps(num_envs):
+        """Processor seconds of 100 steps, the least of five."""
+        vector, actions = make(num_envs=num_envs), np.random.default_rng(0).integers(3, size=num_envs)
+        vector.reset(seed=0)
+
+        def once():
+            began = time.process_time()
+            for _ in range(100):
+                vector.step(actions)
+            return time.process_time() - began
+
+        return min(once() for _ in range(5))
+
+    ratio = steps(5000) / steps(1)
+    print(f"5,000 copies take {ratio:.1f} times as long as one")
+    assert ratio < 50
 
 
 @pytest.mark.parametrize(

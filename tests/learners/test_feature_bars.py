@@ -6,8 +6,10 @@ Seconds are the processor's, of all threads: at least the clock's on an idle mac
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from stopped import HANG
 
 GIGABYTE = 2**30
 
@@ -15,6 +17,7 @@ GRID = """
 import json, resource, sys, time
 import gymnasium as gym
 import numpy as np
+from yardstick import yard
 from irl_gym.bases import RadialBasis
 from irl_gym.features import Unravel
 from irl_gym.learners.feature import FeatureLP
@@ -28,7 +31,7 @@ started = time.process_time()
 result = FeatureLP(phi, S_0=S_0).fit(mdp, expert)
 certificate = result.certificate
 print(json.dumps({
-    "seconds": time.process_time() - started,
+    "yards": (time.process_time() - started) / yard(),
     "bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
     "states": certificate.states,
     "features": certificate.n_features,
@@ -41,7 +44,7 @@ print(json.dumps({
 def measured(side, K, S_0):
     """What FeatureLP took on a grid of side x side cells with K x K Gaussians and S_0 states."""
     command = [sys.executable, "-c", GRID, *map(str, (side, K, S_0))]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, cwd=Path(__file__).parents[1])
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -57,9 +60,9 @@ def million():
 
 
 @pytest.mark.slow
-def test_feature_lp_of_250_000_states_takes_less_than_a_minute(quarter_million):
+def test_feature_lp_of_250_000_states_takes_less_than_1000_yards(quarter_million):
     assert quarter_million["features"] == 64 and quarter_million["states"] == 20_000
-    assert quarter_million["seconds"] < 60
+    assert quarter_million["yards"] < 1_000
 
 
 @pytest.mark.slow

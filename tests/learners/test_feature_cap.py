@@ -11,8 +11,9 @@ from irl_gym.bases import Fourier
 from irl_gym.errors import InvalidParameter
 from irl_gym.features import OneHot, Unravel
 from irl_gym.learners import weights
+from irl_gym.learners.expressible import most_agreement, uniform_margin
 from irl_gym.learners.feature import FeatureLP
-from irl_gym.learners.weights import Rows, best_weights, most_agreement, uniform_margin
+from irl_gym.learners.weights import Rows, best_weights
 from irl_gym.metrics import normalised_score, optimal_actions, policy_value, random_value
 from irl_gym.planners import ValueIteration, tabular_actions
 from irl_gym.tabular_vec_env import TabularVecEnv

@@ -71,6 +71,6 @@ def test_finite_lp_refuses_an_expert_that_is_no_policy(expert, message):
 @pytest.mark.parametrize("learner", [PAPER, FiniteLP(), FiniteLP(l1="auto")])
 def test_finite_lp_stops_when_its_time_is_up(learner):
     model = models.random_model(0, S=100, A=4, kind="sparse")
-    hurried = FiniteLP(learner.r_max, learner.l1, learner.margin_cap, solver="clarabel", time_limit=1e-4)
-    with pytest.raises(SolverTimeout, match=r"0\.0001 s"):
+    hurried = FiniteLP(learner.r_max, learner.l1, learner.margin_cap, solver="clarabel", time_limit=1e-9)
+    with pytest.raises(SolverTimeout, match="1e-09 s"):
         hurried.fit(model.mdp, model.expert)

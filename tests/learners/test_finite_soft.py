@@ -72,8 +72,17 @@ def test_objective_equals_the_dense_program(fields, slack, unvisited):
         weights = relative(model, expert, visits)
         if fields is PAPER and kind == "deterministic":
             continue  # rows of equal successors take margins there, which the dense program does not know
+        ties = () if result is None else result.certificate.unbreakable_rows.tolist()
         expected = soft_reference.soft_lp(
-            model.P, 0.9, expert, weights=weights, slack=slack, cap=fields["margin_cap"], l1=fields["l1"], avoided=low
+            model.P,
+            0.9,
+            expert,
+            weights=weights,
+            slack=slack,
+            cap=fields["margin_cap"],
+            l1=fields["l1"],
+            avoided=low,
+            ties=ties,
         )
         if result is None:
             assert expected <= 1e-7
@@ -146,7 +155,7 @@ def test_states_not_visited_have_no_rows():
 
 
 def test_a_large_slack_gives_the_hard_program():
-    for seed in range(20):
+    for seed in range(8):
         model, expert, visits = seen(seed)
         for fields in (CAPPED, PRICED, {}):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, expert, visits=visits) for C in (None, 1e4))
@@ -155,7 +164,7 @@ def test_a_large_slack_gives_the_hard_program():
 
 
 def test_a_large_slack_gives_the_hard_program_where_the_expert_is_known_everywhere():
-    for seed in range(20):
+    for seed in range(8):
         model = models.random_model(seed, kind="walls")
         for fields in (CAPPED, PRICED, {}, PAPER):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, model.expert) for C in (None, 1e4))

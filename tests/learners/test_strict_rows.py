@@ -4,6 +4,7 @@ import gymnasium as gym
 import models
 import numpy as np
 import pytest
+import soft_reference
 from scipy.optimize import linprog
 
 from irl_gym.comparisons import compare
@@ -136,3 +137,63 @@ def test_no_breakable_tie_is_left_on_the_lake_that_restarts():
     rows = np.flatnonzero(mdp.reachable)
     part = mdp.restrict(rows)
     assert ties_left(part, expert[rows], FiniteLP().fit(part, expert[rows])) == 0
+
+
+# --- experts known in part, and experts that err ---
+
+
+def partly_known(seed: int) -> tuple[np.ndarray, TabularMDP, np.ndarray]:
+    """A random deterministic table, and a policy that is mostly optimal for nothing, unknown in one state."""
+    rng = np.random.default_rng([3, seed])
+    S, A = int(rng.integers(4, 8)), int(rng.integers(2, 5))
+    P = np.eye(S)[rng.integers(S, size=(S, A))]
+    expert = np.eye(A)[rng.integers(A, size=S)]
+    expert[rng.integers(S)] = np.nan
+    return P, TabularMDP.from_dense(P, 0.9, np.full(S, 1 / S)), expert
+
+
+@pytest.mark.parametrize(
+    "fields", [{}, {"margin_cap": 1e-4}, {"margin_cap": 1e-4, "l1": 1e-9}, {"margin_cap": 1e-4, "slack": 1e4}]
+)
+def test_an_expert_known_in_part_loses_the_rows_that_none_makes_strict_and_no_others(fields):
+    compared = unbreakable = 0
+    for seed in range(25):
+        P, mdp, expert = partly_known(seed)
+        can = soft_reference.breakable(P, 0.9, expert)
+        if not can.any():
+            continue
+        certificate = FiniteLP(**fields).fit(mdp, expert).certificate
+        if certificate.violated.size:
+            continue  # slack gave states up
+        known = ~np.isnan(expert).any(axis=1)
+        moved = np.abs(np.einsum("sa,sat->st", np.nan_to_num(expert), P)[:, None] - P).max(axis=2) > 1e-12
+        never = known[:, None] & (expert != 1) & moved & ~can
+        assert certificate.unbreakable_rows.tolist() == np.argwhere(never).tolist(), seed
+        assert (certificate.margin[can.any(axis=1)] >= certificate.margin_cap * (1 - 1e-6)).all(), seed
+        compared, unbreakable = compared + 1, unbreakable + len(certificate.unbreakable_rows)
+    assert compared > 10 and unbreakable > 20
+
+
+def erring() -> tuple[TabularMDP, np.ndarray]:
+    """The five states, and a sixth and seventh between which the expert contradicts itself: each goes to the worse."""
+    P = np.zeros((7, 3, 7))
+    P[:5, :, :5] = five_states().P.toarray().reshape(5, 3, 5)
+    P[5] = np.eye(7)[[0, 2, 2]]
+    P[6] = np.eye(7)[[2, 0, 0]]
+    return TabularMDP.from_dense(P, 0.9, np.eye(7)[[3, 5, 6]].mean(axis=0)), np.zeros(7, dtype=int)
+
+
+@pytest.mark.parametrize("cap", ["auto", 0.1])
+def test_slack_that_gives_a_state_up_leaves_rows_out_and_not_states(cap):
+    mdp, expert = erring()
+    found = FiniteLP(slack=5.0, margin_cap=cap).fit(mdp, expert, visits=np.array([9.0, 9, 9, 9, 9, 9, 1]))
+    certificate = found.certificate
+    assert certificate.violated.tolist() == [6] and found.stats["states_given_up"] == 1
+    assert [0, 1] in certificate.unbreakable_rows.tolist() and [1, 1] in certificate.unbreakable_rows.tolist()
+    assert (certificate.margin[[0, 1, 3, 5]] >= certificate.margin_cap * (1 - 1e-6)).all()
+    assert certificate.duality_gap < 1e-6
+
+
+def test_the_price_at_which_the_reward_vanishes_leaves_those_rows_out_with_slack_too():
+    mdp, expert = swapping(), np.zeros(3, dtype=int)
+    assert FiniteLP(slack=1e4).critical_l1(mdp, expert) == pytest.approx(FiniteLP().critical_l1(mdp, expert), rel=1e-6)

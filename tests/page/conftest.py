@@ -12,6 +12,8 @@ FLAGS = (
 )  # fmt: skip
 
 
+HANG = 600
+"""Seconds after which a page is taken to hang."""
 FITS = """[...document.querySelectorAll('.plot')].every(box =>
     !box.offsetParent || box.querySelector('.main-svg')?.clientWidth === box.clientWidth)"""
 """Is every figure drawn for the width that its box has?"""
@@ -34,16 +36,21 @@ def browser():
 
 def until(page, expression):
     """Wait for an expression to hold. Playwright's own wait evaluates text inside the page, which the page's policy forbids."""
-    deadline = time.monotonic() + 20
-    while not page.evaluate(expression):
-        assert time.monotonic() < deadline, expression
+    until_true(page, lambda: page.evaluate(expression), expression)
+
+
+def until_true(page, holds, told):
+    """Wait for a condition, however slow the machine: the deadline only ends what hangs."""
+    deadline = time.monotonic() + HANG
+    while not holds():
+        assert time.monotonic() < deadline, told
         page.wait_for_timeout(30)
 
 
 def opened(browser, path):
-    """A page; `wrong` lists errors of the console and of scripts, `asked` what was requested, `until` waits."""
+    """A page; `wrong` lists errors of the console and of scripts, `asked` what was requested, `until` and `until_true` wait."""
     page = browser.new_page(viewport={"width": 1280, "height": 844})
-    page.wrong, page.asked, page.until = [], [], partial(until, page)
+    page.wrong, page.asked, page.until, page.until_true = [], [], partial(until, page), partial(until_true, page)
     page.on("console", lambda said: page.wrong.append(said.text) if said.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))

@@ -28,7 +28,7 @@ def test_paper_is_light_and_so_are_its_figures(page, scheme):
     page.emulate_media(color_scheme=scheme)
     if scheme == "light":
         page.locator("#theme").click()  # dark by the button; else by the system
-    page.wait_for_timeout(100)
+    page.until_true(lambda: page.evaluate(INK) == ["#e8ebf1"] * 2, "dark ink")
     dark = page.evaluate(INK)
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print", color_scheme=scheme)
@@ -67,5 +67,5 @@ def test_a_table_that_scrolls_says_so(page):
     shown = "document.querySelector('#summary .scroll').classList.contains('more')"
     wide = page.evaluate(shown)
     page.set_viewport_size({"width": 320, "height": 800})
-    page.wait_for_timeout(300)
-    assert not wide and page.evaluate(shown)
+    assert not wide
+    page.until(shown)

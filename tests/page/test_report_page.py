@@ -89,8 +89,8 @@ def test_the_slider_changes_reward_margins_and_picture(pages, look):
     margins = page.evaluate("document.getElementById('path-margin').data[1].z.flat()")
     page.locator("#lambda-range").fill("3")
     page.until("document.getElementById('path-margin').layout.datarevision === 3")
-    page.wait_for_timeout(100)
-    assert reward(page) != before and figure.screenshot() != seen
+    page.until_true(lambda: figure.screenshot() != seen, "another picture")
+    assert reward(page) != before
     assert page.evaluate("document.getElementById('path-margin').data[1].z.flat()") != margins
 
 
@@ -148,8 +148,7 @@ def test_an_episode_moves_what_it_is_shown_by(pages, look, kind, shows):
     page.locator("#player-expert [data-do=first]").click()
     before = stage.screenshot()
     page.locator("#player-expert .position").press("End")
-    page.wait_for_timeout(100)
-    assert stage.screenshot() != before
+    page.until_true(lambda: stage.screenshot() != before, "another picture")
 
 
 def test_the_row_of_the_moment_is_marked(pages, look):

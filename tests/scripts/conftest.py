@@ -1,10 +1,13 @@
 """Scripts as a person runs them, by subprocess, and a run that several tests only read."""
 
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from stopped import HANG
 
 ROOT = Path(__file__).parents[2]
 PLAN = ("--episodes", "5", "--retrain", "value-iteration")
@@ -14,9 +17,24 @@ PLAN = ("--episodes", "5", "--retrain", "value-iteration")
 def script():
     def run(name, *arguments, cwd):
         command = [sys.executable, str(ROOT / "scripts" / f"{name}.py"), *map(str, arguments)]
-        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
+        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=HANG)
 
     return run
+
+
+@pytest.fixture
+def called(capsys, monkeypatch, unchecked):
+    """A script called in this process with a command line: what it returns and says, without another start of Python."""
+
+    def call(path, *arguments, cwd):
+        monkeypatch.chdir(cwd)
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(path), run_name="__main__")
+        said = capsys.readouterr()
+        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
+
+    return call
 
 
 @pytest.fixture(scope="session")

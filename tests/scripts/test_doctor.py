@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stopped import HANG
 
 from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
 from irl_gym.experiment import Experiment
@@ -37,7 +38,7 @@ def runs(tmp_path_factory):
 
 
 def doctor(folder):
-    return subprocess.run([sys.executable, str(SCRIPT), "--run", str(folder)], capture_output=True, text=True, timeout=120)
+    return subprocess.run([sys.executable, str(SCRIPT), "--run", str(folder)], capture_output=True, text=True, timeout=HANG)
 
 
 def test_a_healthy_run_exits_with_0(runs):

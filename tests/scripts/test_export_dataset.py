@@ -1,7 +1,6 @@
 """The script as a person runs it, by subprocess, and as a machine stops it."""
 
-import os
-import random
+import resource
 import signal
 import subprocess
 import sys
@@ -11,6 +10,8 @@ from pathlib import Path
 import h5py
 import minari
 import pytest
+from stopped import HANG, run_until
+from yardstick import yard
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "export_dataset.py"
 ID = "lake/expert-v0"
@@ -22,7 +23,7 @@ def command(*arguments):
 
 
 def run(*arguments):
-    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=HANG)
 
 
 @pytest.fixture
@@ -53,8 +54,8 @@ def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
         (("--env-id", "CartPole-v1", "--env-kwargs", "{}"), "Or choose ppo, dqn or a2c"),
     ],
 )
-def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, arguments, says):
-    made = run(*LAKE, "--root", str(tmp_path), *arguments)
+def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, called, arguments, says):
+    made = called(SCRIPT, *LAKE, "--root", str(tmp_path), *arguments, cwd=tmp_path)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
     assert not list(tmp_path.iterdir())
 
@@ -82,55 +83,56 @@ def test_a_taken_id_is_refused(tmp_path):
     assert again.returncode == 2 and f"DatasetExists: dataset '{ID}' exists" in again.stderr
 
 
-def started(arguments, root):
-    """The script, once it has begun to export."""
-    process = subprocess.Popen(
-        command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background is born deaf to it
-    )  # fmt: skip
-    deadline = time.monotonic() + 120
-    while not list(root.glob(".exporting-*/shards/000000.npz")) and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.005)
-    return process
+OFTEN = {"irl_gym.export:SHARD_BYTES": 3_000}
+"""A shard is closed after a few episodes."""
+EPISODES, ENTERED = 60, "irl_gym.export:size_of"
+MOMENTS = [
+    ("hdf5", ENTERED, 47), ("arrow", "irl_gym.export:write_files", 1), ("hdf5", "irl_gym.export:publish", 1),
+    ("arrow", "irl_gym.export:_remove", 1),
+]  # fmt: skip
+"""Among the episodes, before the dataset is written, before it gets its name, and before what is left is cleared away."""
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("hdf5", 0), ("arrow", 1)])
-def test_kills_at_random_moments_leave_the_same_dataset(tmp_path, opened, kind, seed):
-    arguments = (*LAKE, "--episodes", "1500", "--format", kind)
-    straight, killed = tmp_path / "straight", tmp_path / "killed"
-    straight.mkdir(), killed.mkdir()
-    assert run(*arguments, "--root", str(straight)).returncode == 0
-    wait = random.Random(seed)
-    process = started((*arguments, "--root", str(killed)), killed)
-    time.sleep(wait.uniform(0.0, 0.7))
-    process.kill()
-    process.communicate()
-    found = [path for path in killed.rglob("data") if not any(part.startswith(".") for part in path.relative_to(killed).parts)]
-    if not found:
-        assert run(*arguments, "--root", str(killed)).returncode == 0
-    assert [one.name for one in killed.iterdir()] == ["lake"]
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory):
+    """Roots by format, each with a dataset in it that nobody interrupted."""
+    roots = {kind: tmp_path_factory.mktemp(kind) for kind in ("hdf5", "arrow")}
+    for kind, root in roots.items():
+        made = run(*LAKE, "--episodes", str(EPISODES), "--format", kind, "--root", str(root))
+        assert made.returncode == 0, made.stderr
+    return roots
+
+
+@pytest.mark.parametrize(("kind", "where", "nth"), MOMENTS)
+def test_a_kill_at_any_stage_leaves_the_same_dataset(tmp_path, opened, straight, kind, where, nth):
+    whole = straight[kind]
+    arguments = (*LAKE, "--episodes", str(EPISODES), "--format", kind, "--root", str(tmp_path))
+    made = run_until(SCRIPT, *arguments, where=where, nth=nth, sent=signal.SIGKILL, **OFTEN)
+    assert made.returncode == -signal.SIGKILL, made.stderr
+    assert any(tmp_path.glob(".exporting-*/shards/*.npz"))
+    if not (tmp_path / ID / "data").exists():
+        made = run(*arguments)
+        assert made.returncode == 0, made.stderr
+        assert [one.name for one in tmp_path.iterdir()] == ["lake"]
     if kind == "hdf5":
-        files = [root / ID / "data" / "main_data.hdf5" for root in (straight, killed)]
+        files = [root / ID / "data" / "main_data.hdf5" for root in (whole, tmp_path)]
         assert files[0].read_bytes() == files[1].read_bytes()
     else:
-        first, second = (opened(root).iterate_episodes() for root in (straight, killed))
+        first, second = (opened(root).iterate_episodes() for root in (whole, tmp_path))
         assert [str(vars(one)) for one in first] == [str(vars(one)) for one in second]
 
 
 def test_another_plan_is_refused_while_one_is_under_way(tmp_path):
-    arguments = (*LAKE, "--steps", "200000", "--root", str(tmp_path))
-    process = started(arguments, tmp_path)
-    os.kill(process.pid, signal.SIGKILL)
-    process.communicate()
+    arguments = (*LAKE, "--episodes", str(EPISODES), "--root", str(tmp_path))
+    run_until(SCRIPT, *arguments, where=ENTERED, nth=30, sent=signal.SIGKILL, **OFTEN)
     made = run(*arguments, "--seed", "1")
     assert made.returncode == 2 and "RunConflict" in made.stderr and "with seed 0: expected that, not 1" in made.stderr
 
 
 def test_an_export_that_is_interrupted_says_how_to_go_on(tmp_path):
-    process = started((*LAKE, "--steps", "300000", "--root", str(tmp_path)), tmp_path)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == 130 and said.startswith("Stopped. The same command continues")
+    arguments = (*LAKE, "--episodes", str(EPISODES), "--root", str(tmp_path))
+    made = run_until(SCRIPT, *arguments, where=ENTERED, nth=30, sent=signal.SIGINT, **OFTEN)
+    assert made.returncode == 130 and made.stderr.startswith("Stopped. The same command continues")
 
 
 def resident(process):
@@ -141,18 +143,20 @@ def resident(process):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["hdf5", "arrow"])
-def test_a_million_steps_take_less_than_a_minute_in_flat_memory(tmp_path, opened, kind):
-    start = time.monotonic()
-    process = started((*LAKE, "--steps", "1000000", "--format", kind, "--root", str(tmp_path)), tmp_path)
-    samples = []
+def test_a_million_steps_take_few_yards_in_flat_memory(tmp_path, opened, kind):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    arguments = (*LAKE, "--steps", "1000000", "--format", kind, "--root", str(tmp_path))
+    process = subprocess.Popen(command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    used = []
     while process.poll() is None:
-        samples.append(resident(process))
+        if used or any(tmp_path.glob(".exporting-*/shards/000000.npz")):
+            used.append(resident(process))
         time.sleep(0.05)
-    seconds, used = time.monotonic() - start, [one for one in samples if one]
     assert process.returncode == 0, process.stderr.read()
     process.stderr.close()
-    print(f"{kind}: {seconds:.1f} s, {used[0]:.0f} MB at the first shard, {max(used):.0f} MB at most")
-    assert seconds < 60 and max(used) - used[0] < 200
+    yards, used = (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before) / yard(), [one for one in used if one]
+    print(f"{kind}: {yards:.0f} yards, {used[0]:.0f} MB at the first shard, {max(used):.0f} MB at most")
+    assert yards < 1_000 and max(used) - used[0] < 200
     assert opened(tmp_path).total_steps >= 1_000_000
     if kind == "hdf5":
         with h5py.File(tmp_path / ID / "data" / "main_data.hdf5") as file:

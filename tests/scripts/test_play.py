@@ -12,6 +12,7 @@ from pathlib import Path
 
 import minari
 import pytest
+from stopped import HANG
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "play.py"
@@ -25,7 +26,7 @@ def command(*arguments):
 
 def piped(keys, *arguments, cwd, **variables):
     return subprocess.run(
-        command(*arguments), cwd=cwd, input=keys, capture_output=True, text=True, timeout=120, env={**os.environ, **variables}
+        command(*arguments), cwd=cwd, input=keys, capture_output=True, text=True, timeout=HANG, env={**os.environ, **variables}
     )
 
 
@@ -85,8 +86,8 @@ def test_a_terminal_without_arrows_is_no_reason_to_lose_a_game(tmp_path):
         (("--env-kwargs", "8x8"), "InvalidParameter: env-kwargs has '8x8'"),
     ],
 )
-def test_a_mistake_gets_one_clear_line(tmp_path, arguments, says):
-    made = piped("", *arguments, cwd=tmp_path)
+def test_a_mistake_gets_one_clear_line(tmp_path, called, arguments, says):
+    made = called(SCRIPT, "--root", "data", *arguments, cwd=tmp_path)
     assert made.returncode == 2 and made.stderr.startswith(says) and made.stderr.count("\n") == 1
 
 
@@ -130,13 +131,13 @@ class Terminal:
 
     def wait_for(self, text):
         """Read on until a text that has not been waited for yet."""
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + HANG
         while (at := self.seen.find(text, self.read)) < 0:
             self._look(deadline)
         self.read = at + len(text)
 
     def end(self):
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + HANG
         while self.process.poll() is None:
             self._look(deadline)
         self._look(deadline)
@@ -204,7 +205,7 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 def test_a_window_gives_keys_until_it_is_closed(tmp_path, monkeypatch):
     made = subprocess.run(
         [sys.executable, "-c", IN_WINDOW, *command(*LAKE, "--mode", "window")[1:]], cwd=tmp_path, capture_output=True,
-        text=True, timeout=120, env={**os.environ, "SDL_VIDEODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"},
+        text=True, timeout=HANG, env={**os.environ, "SDL_VIDEODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"},
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     (episode,) = kept(tmp_path, monkeypatch, "irl_gym/frozenlake-v1-played-v0")

@@ -1,15 +1,14 @@
 """The script as a person runs it, by subprocess."""
 
 import json
-import os
 import runpy
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from stopped import HANG, run_until
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "recover_and_retrain.py"
@@ -21,7 +20,7 @@ def command(*arguments):
 
 
 def run(*arguments, cwd):
-    return subprocess.run(command(*arguments), cwd=cwd, capture_output=True, text=True, timeout=300)
+    return subprocess.run(command(*arguments), cwd=cwd, capture_output=True, text=True, timeout=HANG)
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +74,6 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-kwargs", "8x8"), "InvalidParameter: env-kwargs has '8x8'"),
         (("--env-kwargs", "{broken"), "InvalidParameter: env-kwargs is '{broken'"),
         (("--env-kwargs", "nonsense=1"), "InvalidParameter: FrozenLake-v1 takes no"),
-        (
-            ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--reveal", "none"),
-            "HiddenState: no table of Taxi-v4: observation",
-        ),
         (("--expert", "pppo"), "InvalidParameter: expert is 'pppo': expected one of value-iteration, ppo"),
         (("--expert", "agent.zip"), "InvalidParameter: expert is 'agent.zip', which is no file"),
         (("--reveal", "8"), "InvalidParameter: reveal has '8'"),
@@ -90,13 +85,19 @@ def test_each_experiment_gets_a_folder_of_its_own(finished):
         (("--env-id", "CartPole-v1", "--learner", "trajectory-lp", "--features", "one-hot"), "choose radial"),
     ],
 )
-def test_a_mistake_gets_one_clear_line(tmp_path, arguments, says):
-    made = run(*arguments, cwd=tmp_path)
+def test_a_mistake_gets_one_clear_line(tmp_path, called, arguments, says):
+    made = called(SCRIPT, *arguments, cwd=tmp_path)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
 
 
-def test_help_names_the_learners():
-    text = subprocess.run(command("--help"), capture_output=True, text=True, timeout=120).stdout
+def test_a_mistake_in_a_process_of_its_own_gets_one_clear_line(tmp_path):
+    made = run("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--reveal", "none", cwd=tmp_path)
+    assert made.returncode == 2 and "HiddenState: no table of Taxi-v4: observation" in made.stderr
+    assert "Traceback" not in made.stderr
+
+
+def test_help_names_the_learners(tmp_path, called):
+    text = called(SCRIPT, "--help", cwd=tmp_path).stdout
     assert all(name in text for name in ("finite-lp", "feature-lp", "trajectory-lp", "--features", "--dataset", "--bins"))
 
 
@@ -146,27 +147,18 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'\n"
 
 
+AGENT = "irl_gym.planners:SB3.plan"
+
+
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
-    process = subprocess.Popen(
-        command("--out", "run", "--episodes", "10"), cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background is born deaf to it
-    )  # fmt: skip
-    deadline = time.monotonic() + 120
-    while not (tmp_path / "run" / ".stages" / "reward.json").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == 130 and said.startswith("Stopped. The same command continues")
+    made = run_until(SCRIPT, "--out", "run", "--episodes", "10", where=AGENT, sent=signal.SIGINT, cwd=tmp_path)
+    assert made.returncode == 130 and made.stderr.startswith("Stopped. The same command continues")
 
 
 def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
-    arguments = ("--out", "run", "--episodes", "10", "--total-timesteps", "100000")
-    process = subprocess.Popen(command(*arguments), cwd=tmp_path, stdout=subprocess.DEVNULL)
-    deadline = time.monotonic() + 120
-    while not (tmp_path / "run" / ".stages" / "reward.json").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+    arguments = ("--out", "run", "--episodes", "10", "--total-timesteps", "4096")
+    made = run_until(SCRIPT, *arguments, where=AGENT, sent=signal.SIGKILL, cwd=tmp_path)
+    assert made.returncode == -signal.SIGKILL, made.stderr
     kept = (tmp_path / "run" / "reward.npz").stat().st_mtime_ns
     assert not (tmp_path / "run" / "metrics.json").exists()
     made = run(*arguments, cwd=tmp_path)

@@ -5,12 +5,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from stopped import HANG
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "reward_distances.py"
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, str(SCRIPT), *arguments], capture_output=True, text=True, timeout=300)
+    return subprocess.run([sys.executable, str(SCRIPT), *arguments], capture_output=True, text=True, timeout=HANG)
 
 
 @pytest.fixture(scope="module")

@@ -76,6 +76,10 @@ class Certificate(Proven):
     """(v,) how often the row's state was visited; NaN when that is not known."""
     indifferent: bool = False
     """Is the expert tied, to rounding, in every row of (4)?"""
+    sampling_error: float | None = None
+    """The largest error of a margin on a counted table, of pairs that were visited; None where the table is exact."""
+    unsettled: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Reachable states of a counted table in which a margin above 0 is within its sampling error."""
 
     @property
     def degenerate(self) -> bool:
@@ -92,6 +96,10 @@ class Certificate(Proven):
             f"margins                  {span}",
             self.optimality,
         ]
+        if self.sampling_error is not None:
+            lines.append(f"judged on                {counted_table(self.sampling_error)}")
+        if self.unsettled.size:
+            lines.append(f"unsettled                in {self.unsettled.size} states a margin is within its sampling error")
         if np.isfinite(self.least_l1_norm):
             above = max(self.l1_norm - self.least_l1_norm, 0.0)
             lines.append(f"||R||_1                  {self.l1_norm:.6g}, at most {above:.1e} above the least with these margins")
@@ -112,6 +120,11 @@ class Certificate(Proven):
         if self.unknown.size:
             lines.append(f"unknown                  nothing is known of the expert in {self.unknown.size} reachable states")
         return "\n".join(lines)
+
+
+def counted_table(error: float) -> str:
+    """What a certificate is judged on that has a sampling error."""
+    return f"a counted table, margins within {error:.2g} with 95 % confidence"
 
 
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
@@ -202,7 +215,34 @@ def certify(
         unconstrained=rows[np.setdiff1d(np.flatnonzero(~part.terminal), comparisons.states[usable])],
         **judged(mdp, part, rows, comparisons, R, values, violations, r_max, unbreakable),
         indifferent=tied_throughout(values, R, part),
+        **told_by_counts(part, rows, comparisons, R, values, expert_values(part, comparisons, R, discounted), unbreakable),
     )
+
+
+def expert_values(part: TabularMDP, comparisons: Comparisons, R: TabularReward, discounted: Discounted) -> Vector:
+    """(S,) what the expert collects from each state on: V of (5), for rewards on states paid there too."""
+    paid = R.values if R.on_states else part.mixing(comparisons.distribution) @ R.expected(part).ravel()
+    return discounted.solve(paid)
+
+
+def told_by_counts(
+    part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, values: np.ndarray, V: Vector,
+    unbreakable: np.ndarray | None,
+) -> dict[str, Any]:  # fmt: skip
+    """The fields of a certificate that a counted table alone has: how far its margins are told by the counts.
+
+    Arguments as in `judged`, and V (S,), of which the margins are made.
+    """
+    if comparisons.sampling is None:
+        return {}
+    kept = comparable(comparisons, R) & (True if unbreakable is None else ~unbreakable)
+    errors = comparisons.sampling.of_margins(V if R.on_states else part.gamma * V)
+    seen = errors[kept & ~comparisons.sampling.unvisited]
+    unsettled = kept & (values > tolerated(R.largest(part), part.gamma)) & (values <= errors)
+    return {
+        "sampling_error": float(seen.max(initial=0.0)),
+        "unsettled": rows[np.unique(comparisons.states[unsettled])],
+    }
 
 
 def judged(

@@ -16,6 +16,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
+from irl_gym.sampling_error import undecided
 
 TINY = float(np.finfo(np.float64).tiny)
 TIE_TOLERANCE = 1e-6
@@ -97,10 +98,23 @@ def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tole
 def worst_tie(
     mdp: TabularMDP, learned: TabularReward | np.ndarray, true: TabularReward | np.ndarray, *, tolerance: float = TIE_TOLERANCE
 ) -> Tie:
-    """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions."""
+    """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions.
+
+    On a counted table that are all actions that the counts do not tell from a greedy one.
+    """
     ties = optimal_actions(mdp, learned, tolerance=tolerance)
+    if mdp.visits is not None:
+        ties |= _told_apart_by_noise(mdp, as_reward(learned))
     worst = policy_iteration(mdp, -as_reward(true).expected(mdp), allowed=ties)
     return Tie(worst.policy, -float(mdp.d0 @ worst.V), ties)
+
+
+def _told_apart_by_noise(mdp: TabularMDP, learned: TabularReward) -> ActionSets:
+    """(S, A) actions within the sampling error of a greedy one, on a counted table."""
+    solution = policy_iteration(mdp, learned)
+    worth = mdp.gamma * solution.V + (learned.values if learned.on_states else 0.0)
+    short = solution.Q.max(axis=1, keepdims=True) - solution.Q
+    return short <= undecided(mdp, solution.policy, worth)
 
 
 def best_tie(

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
-from irl_gym.certificate import least_per_state, row_margins, tolerated
+from irl_gym.certificate import expert_values, least_per_state, row_margins, tolerated
 from irl_gym.comparisons import compare
-from irl_gym.dynamic_programming import Solution, policy_iteration, tied
+from irl_gym.dynamic_programming import Discounted, Solution, policy_iteration, tied
 from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
@@ -45,6 +45,8 @@ class Rows:
     """(n,) Q(s, pi) - Q(s, a); NaN without a reward."""
     usable: np.ndarray
     """(n,) rows that a reward of this kind can give a margin."""
+    errors: np.ndarray
+    """(n,) sampling errors of the margins; 0 on an exact table."""
 
     @property
     def violations(self) -> np.ndarray:
@@ -182,18 +184,24 @@ class Case:
         keep = self.states
         part = self.mdp.restrict(keep)
         if gamma is not None:
-            part = TabularMDP(part.P, gamma, part.d0)
+            part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
-        margins = np.full(c.states.size, np.nan)
+        margins, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
         if self.reward is not None:
             R = TabularReward(self.reward.values[keep])
             if self.fully_known:
-                margins = row_margins(part, c, R)
+                discounted = Discounted(part.P_pi(c.distribution), part.gamma)
+                margins = row_margins(part, c, R, discounted)
+                V = expert_values(part, c, R, discounted)
             else:  # what follows an unknown state is worth what acting best is, as in `learners.soft_certificate`
                 Q = policy_iteration(part, R, tolerance=0.0).Q
                 margins = (c.distribution * Q).sum(axis=1)[c.states] - Q[c.states, c.actions]
+                margins[c.trivial & R.on_states] = 0.0
+                V = R.values + part.gamma * Q.max(axis=1) if R.on_states else Q.max(axis=1)
+            if c.sampling is not None:
+                errors = c.sampling.of_margins(V if R.on_states else part.gamma * V)
         usable = ~c.equal & (~c.trivial | (not self.on_states))
-        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, usable)
+        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, usable, errors)
 
     @cached_property
     def least(self) -> Vector:
@@ -202,6 +210,20 @@ class Case:
             return np.full(self.acting.size, np.nan)
         usable = self.rows.usable
         return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
+
+    @cached_property
+    def unsettled(self) -> Indices:
+        """(k,) rows with a margin that is within its sampling error; none on an exact table."""
+        if self.rows is None:
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(
+            self.rows.usable & (self.rows.margins > self.tolerance) & (self.rows.margins <= self.rows.errors)
+        )
+
+    @property
+    def counted(self) -> bool:
+        """Is the table an estimate from counts?"""
+        return self.mdp is not None and self.mdp.visits is not None
 
     @cached_property
     def speaks(self) -> bool:

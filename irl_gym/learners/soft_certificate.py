@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irl_gym._typing import Vector
-from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout
+from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout, told_by_counts
 from irl_gym.dynamic_programming import backup, policy_iteration
 from irl_gym.learners.soft import PartlyKnown
 from irl_gym.mdp import TabularMDP
@@ -41,6 +41,8 @@ class Judged:
     """(n,)."""
     price: float
     """N, what l1 prices."""
+    V: Vector
+    """(S,) what acting best is worth; for rewards on states with what the state itself pays."""
 
 
 def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
@@ -48,7 +50,8 @@ def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
     mdp, c = partly.mdp, partly.comparisons
     steps = R.expected(mdp)
     Q = policy_iteration(mdp, steps, tolerance=0.0).Q
-    Q = backup(mdp, steps, Q.max(axis=1))
+    best = Q.max(axis=1)
+    Q = backup(mdp, steps, best)
     mine = (c.distribution * Q).sum(axis=1)
     margins = mine[c.states] - Q[c.states, c.actions]
     loss = np.where(mdp.terminal, 0.0, Q.max(axis=1) - mine)
@@ -59,7 +62,7 @@ def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
     price = count * float(np.where(partly.avoided, above + r_max, parts).sum())
     if not R.on_states:
         price += float(np.abs(R.values[partly.known]).sum())
-    return Judged(margins, price)
+    return Judged(margins, price, R.values + mdp.gamma * best if R.on_states else best)
 
 
 def _spread(partly: PartlyKnown, R: TabularReward) -> Vector:
@@ -125,4 +128,5 @@ def certify_partly(
         unknown=rows[partly.unknown],
         **judged(mdp, part, rows, c, R, found.margins, short, terms.r_max, terms.unbreakable, visits),
         indifferent=tied_throughout(found.margins[partly.active], R, part),
+        **told_by_counts(part, rows, c, R, found.margins, found.V, terms.unbreakable),
     )

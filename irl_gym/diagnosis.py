@@ -41,6 +41,7 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     sampled.inexpressible,
     truth.poor_expert,
     truth.few_episodes,
+    truth.unconfirmed,
     ties.violated,
     truth.lossy_ties,
     ties.same_successors,

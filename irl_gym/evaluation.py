@@ -9,7 +9,9 @@ import numpy as np
 
 from irl_gym import metrics
 from irl_gym._typing import ActionSets, Matrix
+from irl_gym.confirmation import loss_by_episodes, value_by_episodes
 from irl_gym.curves import Curve, read_curve, two_returns
+from irl_gym.demonstrations import Episode
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular, UndefinedDistance
@@ -54,6 +56,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
             "agreement": metrics.agreement(world.table.mdp, policy, agreed)
             if isinstance(world, TableWorld) and agreed is not None and not told
             else None,
+            **_confirmed(world, episodes, lost=name == "retrained"),
         }
     curve = learning_curve(loop)
     points = np.column_stack([curve.steps, curve.value])
@@ -71,6 +74,18 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         "table": _table(world) if isinstance(world, TableWorld) else None,
         "demonstrations": _recorded(loop),
     }
+
+
+def _confirmed(world: Any, episodes: list[Episode], *, lost: bool) -> dict[str, float | None]:
+    """What fresh episodes say of a value that a counted table gives, and of what is lost against the best; else nothing."""
+    if not isinstance(world, TableWorld) or world.table.mdp.visits is None or not episodes:
+        return {}
+    value = value_by_episodes(world.table, episodes, world.horizon)
+    low, high = value.ends
+    told = {"sampled_value": value.estimate, "sampled_low": low, "sampled_high": high}
+    if lost and world.horizon is None:
+        told["loses_at_most"] = loss_by_episodes(world.table, episodes).ends[1]
+    return told
 
 
 def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
@@ -192,7 +207,7 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
-STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "violated")
+STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 

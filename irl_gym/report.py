@@ -8,6 +8,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from irl_gym.certificate import counted_table
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.intervals import as_interval
 from irl_gym.page.compared import DISTANCES
@@ -80,14 +81,17 @@ def _policies(report: Report) -> Table:
     table.add_column("policy")
     headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
     known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
-    for heading in (*headings.values(), *(("agreement",) if known else ())):
+    confirmed = any("sampled_value" in row for row in report.metrics["policies"].values())
+    more = (("value by episodes (95 %)",) if confirmed else ()) + (("agreement",) if known else ())
+    for heading in (*headings.values(), *more):
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
         score = "-" if row["score"] is None else f"{row['score']:.3f}"
         interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
+        by_episodes = [_by_episodes(row)] if confirmed else []
         whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
-        table.add_row(whose, f"{row['value']:.4f}", score, interval, *agreement)
+        table.add_row(whose, f"{row['value']:.4f}", score, interval, *by_episodes, *agreement)
     given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
     errs = " with its errors" if only and not given else ""
     table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
@@ -96,11 +100,26 @@ def _policies(report: Report) -> Table:
         table.caption += f" There is no score: {reason}."
     if known:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
+    if confirmed:
+        table.caption += f" value by episodes: the same, by episodes that were not counted.{_loses(report)}"
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
     table.caption += _of_training(report)
     table.caption_justify = "left"
     return table
+
+
+def _by_episodes(row: Mapping[str, Any]) -> str:
+    """The value that fresh episodes say a policy has."""
+    if "sampled_value" not in row:
+        return "-"
+    return str(as_interval(row["sampled_value"], row["sampled_low"], row["sampled_high"]))
+
+
+def _loses(report: Report) -> str:
+    """What the agent loses at most against the best possible, on a counted table."""
+    most = report.metrics["policies"]["retrained"].get("loses_at_most")
+    return "" if most is None else f" By these the agent loses at most {most:.3g} of value against the best possible."
 
 
 def _shown(report: Report) -> str:
@@ -114,7 +133,8 @@ def _of_training(report: Report) -> str:
     score, share = report.metrics["policies"]["retrained"]["score"], report.metrics["reward"].get("worst_tie_regret_share")
     if score is None or share is None or score >= ENOUGH or share > MUCH:
         return ""
-    return "\nThe reward is good and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
+    where = ", by the counted table," if report.metrics["reward"].get("sampling_error") is not None else ""
+    return f"\nThe reward is good{where} and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
 
 
 OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"
@@ -171,9 +191,15 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
     if not reward["status"].startswith("Optimal"):
         yield "status", reward["status"]
     best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
+    counted = reward.get("sampling_error")
     seen = metrics["demonstrations"]["episodes_only"] and "fell_short" not in reward
     judged = "; judged are the actions most frequent in its episodes" if seen else ""
     yield "expert optimal under it", f"{best if reward['expert_optimal'] else _why_not(reward)}{judged}"
+    if counted is not None:
+        yield "judged on", counted_table(counted)
+    if reward.get("unsettled_states"):
+        told = "there a margin is within its sampling error, and may be noise. Try more steps to count."
+        yield "states the counts leave open", f"{reward['unsettled_states']:,}: {told}"
     if reward.get("unknown_states"):
         of_all = f"{reward['unknown_states']:,} of {metrics['table']['reachable']:,}"
         yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"

@@ -11,9 +11,9 @@ that looks for margins finds them in the difference. So each row of (4) has
                  is sum_b c_b P_b
 
 An action is the *same* as the expert's where G is within the limit; such rows are 0 in `comparisons`, as those of equal
-successors are. Where even samples without a successor in common would be within it, there are too *few* to tell: then an
-action is the same if 10 % of single rows are further apart, and the rows of pairs never visited are left as the rule for such
-pairs made them. Either way a margin within its error is not one that the counts tell.
+successors are. Where even samples without a successor in common would be within it, there are too *few* to tell. Then a row
+decides alone: the action is the same unless less than 1 % of equal ones are as far apart, or 10 % where the samples share no successor;
+and pairs never visited are left as the rule for such pairs made them. Margins there are within their errors, and so not told.
 
 The limit is Scheffe's (1953), which holds for all V at once. It has 3 (K - 1) / 2 + 1/2 degrees of freedom for K successors,
 where K - 1 would do for many counts of each: of two successors that are two, whose tail exp(-G / 2) holds for any counts
@@ -34,8 +34,8 @@ from irl_gym.mdp import TransitionTable
 
 CONFIDENCE = 0.95
 """That no row of (4) with the same successors is told apart, and that all errors hold."""
-ALONE = 0.1
-"""Share of equal pairs of rows that are told apart where too few steps were seen to decide for all rows at once."""
+ALONE = {"shared": 0.01, "disjoint": 0.1}
+"""Share of rows with the same successors that are told apart where too few steps were seen to decide for all at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,8 @@ def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndar
     others = sp.csr_array(sp.diags_array(1 / others.sum(axis=1)) @ others)
     n = _visits(table)
     with np.errstate(divide="ignore"):
-        share = sp.csr_array((others.data / n[others.indices], others.indices, others.indptr), shape=shape)
-    theirs = 1 / np.asarray(share.max(axis=1).todense()).ravel()  # a mixture is at least as sure as so many steps of it
+        one = sp.csr_array((others.data / n[others.indices], others.indices, others.indptr), shape=shape)
+    theirs = 1 / np.asarray(one.max(axis=1).todense()).ravel()  # a mixture is at least as sure as so many steps of it
     mine = n[pairs]
     first = sp.csr_array(sp.diags_array(theirs) @ (others @ table.P))
     second = sp.csr_array(sp.diags_array(mine) @ table.P[pairs])
@@ -98,7 +98,8 @@ def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndar
     cells = np.maximum(np.diff(both.indptr) - 1, 1)
     limit = chi2.isf((1 - CONFIDENCE) / table.P.shape[0], 1.5 * cells + 0.5)
     few = 2 * totals <= limit
-    alone = (chi2.isf(ALONE, cells) >= G) & (theirs > 0) & (mine > 0)
+    share = np.where(G >= (1 - 1e-9) * 2 * totals, ALONE["disjoint"], ALONE["shared"])
+    alone = (chi2.sf(G, cells) >= share) & (theirs > 0) & (mine > 0)
     return SamplingError(table, weights, limit, few, np.where(few, alone, limit >= G))
 
 

@@ -43,3 +43,6 @@ def exact(most: int = 10, demand: float = 3.0, gamma: float = 0.95) -> tuple[Tab
             np.add.at(P[s, a], following, p)
             R[s, a] = -p @ (HOLDING * following + SHORTAGE * np.maximum(wanted - filled, 0)) - FIXED * (a > 0)
     return TabularMDP.from_dense(P / P.sum(axis=2, keepdims=True), gamma, np.full(size, 1 / size)), TabularReward(R)
+
+
+gym.register("Inventory-v0", entry_point=Inventory, max_episode_steps=200)

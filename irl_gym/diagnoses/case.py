@@ -216,9 +216,7 @@ class Case:
         """(k,) rows with a margin that is within its sampling error; none on an exact table."""
         if self.rows is None:
             return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(
-            self.rows.usable & (self.rows.margins > self.tolerance) & (self.rows.margins <= self.rows.errors)
-        )
+        return np.flatnonzero(self.rows.usable & (self.rows.margins > self.tolerance) & (self.rows.margins <= self.rows.errors))
 
     @property
     def counted(self) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.certificate import counted_table
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
@@ -45,7 +46,7 @@ def verdict(run: Run) -> dict[str, Any]:
             "label": "expert optimal under the reward",
             "value": "yes" if optimal else "no",
             "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
-            "mood": "good" if optimal and not reward.get("degenerate") else "bad",
+            "mood": "bad" if not optimal or reward.get("degenerate") else "plain" if reward.get("unsettled_states") else "good",
         },
     ]
     return {"sentence": _sentence(run, score, share, optimal), "figures": figures}
@@ -82,7 +83,18 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool)
         else "; every policy that is best under that reward is as good as the expert"
     )
     certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it everywhere"
-    return f"{earned}{tie}; {certified}."
+    return f"{earned}{tie}; {certified}.{_counted(run)}"
+
+
+def _counted(run: Run) -> str:
+    """What the verdict rests on, where the table is counted; nothing where it is exact."""
+    error, agent = run.metrics["reward"].get("sampling_error"), run.metrics["policies"]["retrained"]
+    if error is None:
+        return ""
+    n, most = run.metrics["reward"].get("unsettled_states"), agent.get("loses_at_most")
+    left = f", in {counted(n, 'state')} less than that" if n else ""
+    lost = "" if most is None else f" By episodes that were not counted the agent loses at most {number(most, 3)} of value."
+    return f" All this is judged on {counted_table(error)}{left}.{lost}"
 
 
 def certificate(run: Run) -> Section:
@@ -100,6 +112,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     reward, held = run.metrics["reward"], run.certificate
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     yield "Expert optimal under the reward", "yes" if reward["expert_optimal"] else _why_not(reward)
+    if reward.get("sampling_error") is not None:
+        yield "Judged on", counted_table(reward["sampling_error"])
     if held.get("degenerate"):
         yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)
@@ -140,6 +154,7 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
 _COUNTS = {
     "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
     "marginless": ("Without a margin", "the expert is only tied with another action"),
+    "unsettled": ("Left open by the counts", "a margin of the expert is within its sampling error, and may be noise"),
     "unbreakable": ("Always tied", "some action ties with the expert's under every such reward that makes the expert optimal"),
     "unknown": ("Expert not seen", "nothing is asked of its actions there"),
     "violated": ("Violated", "another action is better there under the learned reward"),

@@ -11,9 +11,9 @@ that looks for margins finds them in the difference. So each row of (4) has
                  is sum_b c_b P_b
 
 An action is the *same* as the expert's where G is within the limit; such rows are 0 in `comparisons`, as those of equal
-successors are. Where even samples without a successor in common would be within it, there are too *few* to tell. Then a row
-decides alone: the action is the same unless less than 1 % of equal ones are as far apart, or 10 % where the samples share no successor;
-and pairs never visited are left as the rule for such pairs made them. Margins there are within their errors, and so not told.
+successors are. Where even samples without a successor in common would be within it, there are too *few* to tell. Then a
+row decides alone: the action is the same unless less than 1 % of equal ones are as far apart, or 10 % where the samples share
+no successor; and pairs never visited are left as the rule for such pairs made them. Margins there are within their errors.
 
 The limit is Scheffe's (1953), which holds for all V at once. It has 3 (K - 1) / 2 + 1/2 degrees of freedom for K successors,
 where K - 1 would do for many counts of each: of two successors that are two, whose tail exp(-G / 2) holds for any counts

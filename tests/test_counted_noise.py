@@ -74,7 +74,7 @@ def test_a_reward_on_stocks_is_not_called_healthy(size):
 
 def test_where_no_row_is_left_the_error_says_that_the_table_is_counted():
     found, expert = counts("small")
-    with pytest.raises(DegenerateExpert, match="The table is counted: of 1. actions the counts do not tell"):
+    with pytest.raises(DegenerateExpert, match=r"The table is counted: of 1. actions the counts do not tell"):
         FiniteLP().fit(found.mdp, expert)
 
 

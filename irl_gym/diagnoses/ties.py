@@ -111,7 +111,8 @@ def unsettled(case: Case) -> Finding | None:
         f"The table is counted, and in {{states}} the expert's margin over another action is within what the counts leave "
         f"open, {rows.errors[which].min():.2g} to {rows.errors[which].max():.2g}, so that it may be noise: {{where}}."
     )
-    mend = "More steps to count, in which these actions are taken: four times as many halve the error.", ("--steps",)
+    more = "More steps to count (`Interaction(steps=...)`, `Enumeration(runs=...)`, episodes): four times as many halve it."
+    mend = more, ("--table sample", "--steps")
     return _found("within-sampling-error", told, mend, rows, which)
 
 

@@ -104,12 +104,12 @@ def worst_tie(
     """
     ties = optimal_actions(mdp, learned, tolerance=tolerance)
     if mdp.visits is not None:
-        ties |= _told_apart_by_noise(mdp, as_reward(learned))
+        ties |= _not_told_from_greedy(mdp, as_reward(learned))
     worst = policy_iteration(mdp, -as_reward(true).expected(mdp), allowed=ties)
     return Tie(worst.policy, -float(mdp.d0 @ worst.V), ties)
 
 
-def _told_apart_by_noise(mdp: TabularMDP, learned: TabularReward) -> ActionSets:
+def _not_told_from_greedy(mdp: TabularMDP, learned: TabularReward) -> ActionSets:
     """(S, A) actions within the sampling error of a greedy one, on a counted table."""
     solution = policy_iteration(mdp, learned)
     worth = mdp.gamma * solution.V + (learned.values if learned.on_states else 0.0)

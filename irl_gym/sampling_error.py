@@ -61,7 +61,7 @@ class SamplingError:
         spread = np.sqrt(size.power(2) @ (spread_of(self.table, centred) ** 2 / n))
         reach = np.repeat(_ranges(self.table, centred), self.table.n_actions)  # of the state, whichever action leads there
         errors = np.sqrt(self.limit) * spread + self.limit / 6 * (size @ (reach / n))
-        return np.where(self.unvisited, np.abs(size).sum(axis=1) * np.ptp(V), errors)
+        return np.where(self.unvisited, size.sum(axis=1) * np.ptp(V), errors)
 
     @property
     def unvisited(self) -> np.ndarray:

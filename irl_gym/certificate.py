@@ -122,9 +122,9 @@ class Certificate(Proven):
         return "\n".join(lines)
 
 
-def counted_table(error: float) -> str:
-    """What a certificate is judged on that has a sampling error."""
-    return f"a counted table, margins within {error:.2g} with 95 % confidence"
+def counted_table(error: float | None) -> str:
+    """What a certificate on a counted table is judged on; the error of its margins where that is known."""
+    return "a counted table" + ("" if error is None else f", margins within {error:.2g} with 95 % confidence")
 
 
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:

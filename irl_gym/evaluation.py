@@ -217,6 +217,7 @@ def _table(world: TableWorld) -> dict[str, Any]:
         "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "error": evidence.error,
+        "counted": mdp.visits is not None,
         "method": evidence.method,
         "check": None if evidence.check is None else dict(vars(evidence.check)),
     }  # fmt: skip

@@ -133,7 +133,7 @@ def _of_training(report: Report) -> str:
     score, share = report.metrics["policies"]["retrained"]["score"], report.metrics["reward"].get("worst_tie_regret_share")
     if score is None or share is None or score >= ENOUGH or share > MUCH:
         return ""
-    where = ", by the counted table," if report.metrics["reward"].get("sampling_error") is not None else ""
+    where = ", by the counted table," if (report.metrics["table"] or {}).get("counted") else ""
     return f"\nThe reward is good{where} and the agent is not yet: try more --total-timesteps, or --retrain value-iteration."
 
 
@@ -191,12 +191,11 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
     if not reward["status"].startswith("Optimal"):
         yield "status", reward["status"]
     best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
-    counted = reward.get("sampling_error")
     seen = metrics["demonstrations"]["episodes_only"] and "fell_short" not in reward
     judged = "; judged are the actions most frequent in its episodes" if seen else ""
     yield "expert optimal under it", f"{best if reward['expert_optimal'] else _why_not(reward)}{judged}"
-    if counted is not None:
-        yield "judged on", counted_table(counted)
+    if (metrics["table"] or {}).get("counted"):
+        yield "judged on", counted_table(reward.get("sampling_error"))
     if reward.get("unsettled_states"):
         told = "there a margin is within its sampling error, and may be noise. Try more steps to count."
         yield "states the counts leave open", f"{reward['unsettled_states']:,}: {told}"

@@ -12,6 +12,7 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.certificate import OPTIMAL_WITHIN
+from irl_gym.comparisons import compare
 from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
@@ -106,6 +107,9 @@ def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, R: np.ndarray, 
     advantage = (distribution * onwards).sum(axis=1, keepdims=True) - onwards
     taken = distribution > 0
     judged = mdp.reachable & ~mdp.terminal & known
+    if mdp.visits is not None:  # actions that the counts do not tell from the expert's
+        rows = compare(mdp, distribution, np.flatnonzero(judged))
+        advantage[rows.states[rows.trivial], rows.actions[rows.trivial]] = 0.0
     margin = np.where(taken, np.inf, advantage).min(axis=1)
     scale = float(np.abs(R).max(initial=0.0))
     tolerance = OPTIMAL_WITHIN * scale * (1 + 0.1 / (1 - mdp.gamma))

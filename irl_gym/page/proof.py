@@ -88,13 +88,13 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool)
 
 def _counted(run: Run) -> str:
     """What the verdict rests on, where the table is counted; nothing where it is exact."""
-    error, agent = run.metrics["reward"].get("sampling_error"), run.metrics["policies"]["retrained"]
-    if error is None:
+    reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
+    if not (run.metrics.get("table") or {}).get("counted"):
         return ""
-    n, most = run.metrics["reward"].get("unsettled_states"), agent.get("loses_at_most")
+    n, most = reward.get("unsettled_states"), agent.get("loses_at_most")
     left = f", in {counted(n, 'state')} less than that" if n else ""
     lost = "" if most is None else f" By episodes that were not counted the agent loses at most {number(most, 3)} of value."
-    return f" All this is judged on {counted_table(error)}{left}.{lost}"
+    return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{lost}"
 
 
 def certificate(run: Run) -> Section:
@@ -112,8 +112,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     reward, held = run.metrics["reward"], run.certificate
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     yield "Expert optimal under the reward", "yes" if reward["expert_optimal"] else _why_not(reward)
-    if reward.get("sampling_error") is not None:
-        yield "Judged on", counted_table(reward["sampling_error"])
+    if (run.metrics.get("table") or {}).get("counted"):
+        yield "Judged on", counted_table(reward.get("sampling_error"))
     if held.get("degenerate"):
         yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)

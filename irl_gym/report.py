@@ -118,8 +118,12 @@ def _by_episodes(row: Mapping[str, Any]) -> str:
 
 def _loses(report: Report) -> str:
     """What the agent loses at most against the best possible, on a counted table."""
-    most = report.metrics["policies"]["retrained"].get("loses_at_most")
-    return "" if most is None else f" By these the agent loses at most {most:.3g} of value against the best possible."
+    row = report.metrics["policies"]["retrained"]
+    if "loses_at_most" not in row:
+        return ""
+    if row["loses_at_most"] is None:
+        return " What the agent loses against the best possible they do not tell."
+    return f" By these the agent loses at most {row['loses_at_most']:.3g} of value against the best possible."
 
 
 def _shown(report: Report) -> str:

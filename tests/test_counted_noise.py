@@ -3,11 +3,14 @@
 Its table by hand is the oracle. The bar: no false "healthy", and the policy of the recovered reward within the error stated.
 """
 
+import io
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from inventory import Inventory, exact
+from rich.console import Console
 
 from irl_gym.comparisons import compare
 from irl_gym.confirmation import loss_by_episodes, value_by_episodes, value_error
@@ -15,9 +18,13 @@ from irl_gym.counting import Counting, Interaction, interact
 from irl_gym.diagnosis import doctor
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import DegenerateExpert
+from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.metrics import policy_value, worst_tie
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import ValueIteration
 from irl_gym.policies import TabularPolicy
+from irl_gym.report import print_report
 from irl_gym.rollouts import run_episodes
 from irl_gym.tabulate import tabulate
 
@@ -149,6 +156,20 @@ def test_ties_are_kept_on_a_table_counted_in_demonstrations():
     found = Counting().table(episodes, Inventory().observation_space, 11, gamma=0.95)
     structural = compare(exact()[0], expert).trivial
     assert compare(found.mdp, expert).trivial[structural].all()
+
+
+def test_a_run_on_counts_says_what_its_agent_loses_at_most(tmp_path):
+    asked = Experiment(
+        "Inventory-v0", 0.95, table=Interaction(20_000), learner=FiniteLP(reward_on="state-action"), retrain=ValueIteration(),
+        episodes=5, eval_episodes=40,
+    )  # fmt: skip
+    report = recover_and_retrain(asked, tmp_path / "run")
+    most = report.metrics["policies"]["retrained"]["loses_at_most"]
+    console = Console(record=True, width=300, file=io.StringIO())
+    print_report(report, console)
+    assert f"By these the agent loses at most {most:.3g} of value" in " ".join(console.export_text().split())
+    page = " ".join(Path(report.page).read_text().split())
+    assert "By episodes that were not counted the agent loses at most" in page and 0 < most < 4
 
 
 @pytest.mark.slow

@@ -93,7 +93,10 @@ def _counted(run: Run) -> str:
         return ""
     n, most = reward.get("unsettled_states"), agent.get("loses_at_most")
     left = f", in {counted(n, 'state')} less than that" if n else ""
-    lost = "" if most is None else f" By episodes that were not counted the agent loses at most {number(most, 3)} of value."
+    known = "episodes that were not counted" if "loses_at_most" in agent else ""
+    lost = f" By {known} the agent loses at most {number(most, 3)} of value against the best possible." if known else ""
+    if known and most is None:
+        lost = f" What the agent loses against the best possible {known} do not tell."
     return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{lost}"
 
 

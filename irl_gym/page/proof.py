@@ -91,12 +91,15 @@ def _counted(run: Run) -> str:
     reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
     if not (run.metrics.get("table") or {}).get("counted"):
         return ""
-    n, most = reward.get("unsettled_states"), agent.get("loses_at_most")
-    left = f", in {counted(n, 'state')} less than that" if n else ""
-    known = "episodes that were not counted" if "loses_at_most" in agent else ""
-    lost = f" By {known} the agent loses at most {number(most, 3)} of value against the best possible." if known else ""
-    if known and most is None:
-        lost = f" What the agent loses against the best possible {known} do not tell."
+    n, lost = reward.get("unsettled_states"), ""
+    left = f", and in {counted(n, 'state')} a margin is smaller than its error" if n else ""
+    if "loses_at_most" in agent:
+        most = agent["loses_at_most"]
+        lost = (
+            f" By episodes that were not counted the agent loses at most {number(most, 3)} of value against the best possible."
+        )
+        if most is None:
+            lost = " What the agent loses against the best possible episodes that were not counted do not tell."
     return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{lost}"
 
 

@@ -7,8 +7,9 @@ upwards. Episodes that were not counted have neither error. Of N of them, with d
     loss      the mean of V(s_0) - G, V the best value by the table: what the policy loses against the best possible at most
 
 The best policy is worth no more than V but for the error that the counts leave in *its* value; that of the table's best stands
-for it: sqrt(sum_sa mu(s, a)^2 Var(r + gamma V(s')) / (n(s, a) - 1)), mu how often a step is taken, discounted. An episode that
-is cut after T steps leaves out gamma^T / (1 - gamma) of the largest reward seen at most, which widens both.
+for it: 1.96 sqrt(sum_sa mu(s, a)^2 Var(r + gamma V(s')) / (n(s, a) - 1)), mu how often a step is taken, discounted. A step of
+which less than two were counted may be off by all that rewards and V allow. An episode that is cut after T steps leaves out
+gamma^T / (1 - gamma) of the largest reward seen at most, which widens both.
 Axes: S states, A actions, N episodes.
 """
 
@@ -23,9 +24,6 @@ from irl_gym.intervals import LEVEL, Interval, mean_interval
 from irl_gym.policies import as_distribution
 from irl_gym.sampling_error import spread_of
 from irl_gym.tabulation import Tabulation
-
-NEVER = 1e-9
-"""Discounted visits below which an action's counts play no part."""
 
 
 def value_by_episodes(table: Tabulation, episodes: Sequence[Episode], horizon: int | None = None) -> Interval:
@@ -45,8 +43,6 @@ def value_by_episodes(table: Tabulation, episodes: Sequence[Episode], horizon: i
 def loss_by_episodes(table: Tabulation, episodes: Sequence[Episode]) -> Interval:
     """What the policy of some episodes loses against the best possible: an estimate, and with 97.5 % no more than `high`.
 
-    Unknown where the table's best policy takes actions of which less than two steps were counted.
-
     Args:
         table: a counted one.
         episodes: N, fresh, of one policy.
@@ -55,16 +51,12 @@ def loss_by_episodes(table: Tabulation, episodes: Sequence[Episode]) -> Interval
     returns, left = _discounted(table, episodes)
     first = np.array([int(episode.rows(table.states)[0]) for episode in episodes])
     found = mean_interval(best.V[first] - returns)
-    more = float(norm.ppf((1 + LEVEL) / 2)) * value_error(table, best.policy) + left
-    if not (found.known and np.isfinite(more)):
-        return Interval(found.estimate, float("nan"), float("nan"))
+    more = value_error(table, best.policy) + left
     return Interval(found.estimate, found.low - more, found.high + more)
 
 
 def value_error(table: Tabulation, policy: np.ndarray) -> float:
-    """The standard error that counts leave in a policy's value from the first states of a counted table.
-
-    Infinite where it takes actions of which less than two steps were counted. The first states are taken as they are.
+    """The error that counts leave in a policy's value from the first states, with 95 % confidence; these are taken as they are.
 
     Args:
         table: a counted one.
@@ -82,11 +74,10 @@ def value_error(table: Tabulation, policy: np.ndarray) -> float:
         square = np.asarray(mdp.P.multiply(worth.multiply(worth)).sum(axis=1)).ravel()
         spread = np.sqrt(np.maximum(square - mean**2, 0.0))
     taken = occupancy(mdp, policy).ravel()
-    used = taken > NEVER
-    n = mdp.visits.ravel()[used]
-    if (n < 2).any():
-        return float("inf")
-    return float(np.sqrt(np.sum((taken[used] * spread[used]) ** 2 / (n - 1))))
+    few = mdp.visits.ravel() < 2
+    error = np.sqrt(np.sum((taken * spread)[~few] ** 2 / (mdp.visits.ravel()[~few] - 1)))
+    unknown = taken[few].sum() * (2 * payments.largest + mdp.gamma * np.ptp(V))
+    return float(norm.ppf((1 + LEVEL) / 2) * error + unknown)
 
 
 def _discounted(table: Tabulation, episodes: Sequence[Episode]) -> tuple[np.ndarray, float]:

@@ -100,7 +100,7 @@ def worst_tie(
 ) -> Tie:
     """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions.
 
-    On a counted table that are all actions that the counts do not tell from a greedy one.
+    On a counted table actions whose successors the counts do not tell from a greedy one's are tied with it.
     """
     ties = optimal_actions(mdp, learned, tolerance=tolerance)
     if mdp.visits is not None:
@@ -110,7 +110,7 @@ def worst_tie(
 
 
 def _not_told_from_greedy(mdp: TabularMDP, learned: TabularReward) -> ActionSets:
-    """(S, A) actions within the sampling error of a greedy one, on a counted table."""
+    """(S, A) actions that on a counted table have a greedy one's successors, and are within their sampling error of it."""
     solution = policy_iteration(mdp, learned)
     worth = mdp.gamma * solution.V + (learned.values if learned.on_states else 0.0)
     short = solution.Q.max(axis=1, keepdims=True) - solution.Q

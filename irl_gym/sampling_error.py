@@ -104,7 +104,7 @@ def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndar
 
 
 def undecided(table: TransitionTable, policy: Actions, worth: Vector) -> Matrix:
-    """(S, A) how much better than a policy's action (S,) each other one may be, by the counts; 0 where these are too few.
+    """(S, A) how much better than a policy's action (S,) another of the same successors may be, by the counts; else 0.
 
     Args:
         table: with visits.
@@ -114,7 +114,7 @@ def undecided(table: TransitionTable, policy: Actions, worth: Vector) -> Matrix:
     found = np.zeros((table.n_states, table.n_actions))
     states, actions = np.nonzero(~table.terminal[:, None] & (np.arange(table.n_actions) != policy[:, None]))
     compared = sampling_error(table, np.eye(table.n_actions)[policy], states, actions)
-    found[states, actions] = np.where(compared.few & ~compared.same, 0.0, compared.of_margins(worth))
+    found[states, actions] = np.where(compared.same, compared.of_margins(worth), 0.0)
     return found
 
 

@@ -143,9 +143,10 @@ def test_a_cut_widens_the_value_by_what_was_left_out():
     assert whole.high - counted.high == pytest.approx(left) and counted.low - whole.low == pytest.approx(left)
 
 
-def test_the_error_of_a_value_is_unknown_where_a_pair_was_counted_once():
+def test_a_pair_that_was_counted_once_may_be_off_by_all_that_rewards_and_values_allow():
     found = Counting().table(interact(Inventory(), 15, seed=0), Inventory().observation_space, 11, gamma=0.95)
-    assert value_error(found, policy_iteration(found.mdp, found.reward).policy) == np.inf
+    best = policy_iteration(found.mdp, found.reward)
+    assert value_error(found, best.policy) > found.payments.largest
 
 
 def test_ties_are_kept_on_a_table_counted_in_demonstrations():
@@ -176,18 +177,19 @@ def test_a_run_on_counts_says_what_its_agent_loses_at_most(tmp_path):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("steps", [20_000, 100_000])
 def test_no_run_is_falsely_healthy_and_each_loses_what_it_says(size, steps):
-    false, beyond, unknown, split = 0, 0, 0, 0
+    false, beyond, split, few = 0, 0, 0, 0
     for seed in range(10):
         found, expert = counts(size, steps, seed)
         structural = compare(exact(*SIZES[size])[0], expert).trivial
-        split += int((~compare(found.mdp, expert).trivial[structural]).sum())
+        compared = compare(found.mdp, expert)
+        split += int((structural & ~compared.trivial & ~compared.sampling.few).sum())
+        few += int((structural & ~compared.trivial & compared.sampling.few).sum())
         for kind in ("state", "state-action"):
             result, diagnosis = learned(size, kind, steps, seed)
             if result is None:
                 continue
             lost, said, _, _ = judged(size, result, found, seed)
-            unknown += not said.known
-            beyond += said.known and lost > said.high
-            false += diagnosis.healthy and lost > (said.high if said.known else 3)
-    print(f"{size}, {steps}: {split} ties split, {false} false healthy, {beyond} beyond, {unknown} unknown")
-    assert false == 0 and beyond == 0 and split <= 5
+            beyond += lost > said.high
+            false += diagnosis.healthy and lost > 3
+    print(f"{size}, {steps}: {split} ties split, {few} of too few counts, {false} false healthy, {beyond} beyond what is said")
+    assert false == 0 and beyond == 0 and split <= 2

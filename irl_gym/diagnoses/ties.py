@@ -68,7 +68,8 @@ def same_successors(case: Case) -> Finding | None:
     harm = paid if case.true is not None else "which does no harm only if they also cost the same"
     where = "where the expert's own leads, as far as the counts tell" if case.counted else "where the expert's own leads"
     told = f"In {{states}} an action leads {where}, {harm}: {{where}}. No reward on states tells them apart."
-    return _found("same-successors", told, ('reward_on="state-action".', on_steps(case)), rows, which)
+    mend = 'reward_on="state-action"; more steps to count, where they do lead elsewhere.' if case.counted else None
+    return _found("same-successors", told, (mend or 'reward_on="state-action".', on_steps(case)), rows, which)
 
 
 def _marginless(case: Case, rows: Rows) -> np.ndarray:

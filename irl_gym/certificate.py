@@ -17,6 +17,7 @@ from irl_gym.dynamic_programming import Discounted
 from irl_gym.mdp import TabularMDP
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
+from irl_gym.sampling_error import counted_table
 
 OPTIMAL_WITHIN = 1e-8
 """What solvers' feasibility leaves of (4). A violation below this, times max |R| and a tenth of 1 / (1 - gamma), is none; nor
@@ -122,11 +123,6 @@ class Certificate(Proven):
         return "\n".join(lines)
 
 
-def counted_table(error: float | None) -> str:
-    """What a certificate on a counted table is judged on; the error of its margins where that is known."""
-    return "a counted table" + ("" if error is None else f", margins within {error:.2g} with 95 % confidence")
-
-
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
     """(n,) rows that a margin is taken over: not an equality, and not trivial for the reward's kind."""
     return ~comparisons.equal & ~comparisons.trivial if reward.on_states else ~comparisons.equal
@@ -213,9 +209,19 @@ def certify(
         margin_cap=None if margin_cap is None else float(margin_cap),
         least_l1_norm=dual.least_l1_norm(y_l1),
         unconstrained=rows[np.setdiff1d(np.flatnonzero(~part.terminal), comparisons.states[usable])],
-        **judged(mdp, part, rows, comparisons, R, values, violations, r_max, unbreakable),
+        **judged(
+            mdp,
+            part,
+            rows,
+            comparisons,
+            R,
+            values,
+            expert_values(part, comparisons, R, discounted),
+            violations,
+            r_max,
+            unbreakable,
+        ),
         indifferent=tied_throughout(values, R, part),
-        **told_by_counts(part, rows, comparisons, R, values, expert_values(part, comparisons, R, discounted), unbreakable),
     )
 
 
@@ -225,29 +231,9 @@ def expert_values(part: TabularMDP, comparisons: Comparisons, R: TabularReward, 
     return discounted.solve(paid)
 
 
-def told_by_counts(
-    part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, values: np.ndarray, V: Vector,
-    unbreakable: np.ndarray | None,
-) -> dict[str, Any]:  # fmt: skip
-    """The fields of a certificate that a counted table alone has: how far its margins are told by the counts.
-
-    Arguments as in `judged`, and V (S,), of which the margins are made.
-    """
-    if comparisons.sampling is None:
-        return {}
-    kept = comparable(comparisons, R) & (True if unbreakable is None else ~unbreakable)
-    errors = comparisons.sampling.of_margins(V if R.on_states else part.gamma * V)
-    seen = errors[kept & ~comparisons.sampling.unvisited]
-    unsettled = kept & (values > tolerated(R.largest(part), part.gamma)) & (values <= errors)
-    return {
-        "sampling_error": float(seen.max(initial=0.0)),
-        "unsettled": rows[np.unique(comparisons.states[unsettled])],
-    }
-
-
 def judged(
     mdp: TabularMDP, part: TabularMDP, rows: np.ndarray, comparisons: Comparisons, R: TabularReward, values: np.ndarray,
-    violations: np.ndarray, r_max: float, unbreakable: np.ndarray | None, visits: np.ndarray | None = None,
+    V: Vector, violations: np.ndarray, r_max: float, unbreakable: np.ndarray | None, visits: np.ndarray | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a certificate that do not depend on the program.
 
@@ -258,6 +244,7 @@ def judged(
         comparisons: the rows of (4) in the part.
         R: the reward on the part.
         values: (n,) margin of each row of (4).
+        V: (S,) of the part, of which the margins are made.
         violations: (n,) of each row of (4).
         r_max: bound on |R|.
         unbreakable: (n,) rows that no reward makes strict; None where no program asked.
@@ -272,6 +259,9 @@ def judged(
     least = least_per_state(values[kept], comparisons.states[kept], part.n_states)
     margin = np.full(mdp.n_states, np.nan)
     margin[rows] = least
+    error, unsettled = None, np.zeros_like(kept)
+    if comparisons.sampling is not None:
+        error, unsettled = comparisons.sampling.unsettled(values, V if R.on_states else mdp.gamma * V, kept, rounding)
     return {
         "expert_optimal": bool(worst <= rounding),
         "worst_violation": worst,
@@ -283,6 +273,8 @@ def judged(
         "marginless": rows[least <= rounding],
         "unbreakable": rows[np.unique(comparisons.states[left_out])],
         "unbreakable_rows": _pairs(comparisons, rows, left_out),
+        "sampling_error": error,
+        "unsettled": rows[np.unique(comparisons.states[unsettled])],
         **violated_rows(violations, rounding, comparisons, rows, visits),
     }
 

@@ -13,7 +13,8 @@ gamma^T / (1 - gamma) of the largest reward seen at most, which widens both.
 Axes: S states, A actions, N episodes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.stats import norm
@@ -86,3 +87,13 @@ def _discounted(table: Tabulation, episodes: Sequence[Episode]) -> tuple[np.ndar
     returns = np.array([gamma ** np.arange(len(one)) @ one.rewards for one in episodes])
     left = np.array([0.0 if one.terminated else gamma ** len(one) for one in episodes])
     return returns, float(left.mean()) * table.payments.largest / (1 - gamma)
+
+
+def loss_told(row: Mapping[str, Any]) -> str:
+    """What a policy loses at most against the best possible, by its row of metrics.json; nothing where nobody asked."""
+    if "loses_at_most" not in row:
+        return ""
+    most = row["loses_at_most"]
+    if most is None:
+        return " What the agent loses against the best possible episodes that were not counted do not tell."
+    return f" By episodes that were not counted the agent loses at most {most:.3g} of value against the best possible."

@@ -8,23 +8,20 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from irl_gym.certificate import counted_table
 from irl_gym.claims import ENVIRONMENT
+from irl_gym.confirmation import loss_told
 from irl_gym.intervals import as_interval
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
+from irl_gym.sampling_error import counted_table
 
 MUCH = 0.05
 """Share of the expert's advantage over random; a worst tie that loses more is worth a warning."""
-
-
 ENOUGH = 0.9
 """Score of an agent that has learned what the reward asks for."""
-
 ROUNDING = 1e-12
 """A distance from the best possible up to this is none."""
-
 HARM = 1e-6
 """Share of the expert's advantage over random below which a tie costs nothing but rounding."""
 
@@ -101,7 +98,8 @@ def _policies(report: Report) -> Table:
     if known:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if confirmed:
-        table.caption += f" value by episodes: the same, by episodes that were not counted.{_loses(report)}"
+        told = loss_told(report.metrics["policies"]["retrained"])
+        table.caption += f" value by episodes: the same, by episodes that were not counted.{told}"
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
     table.caption += _of_training(report)
@@ -114,16 +112,6 @@ def _by_episodes(row: Mapping[str, Any]) -> str:
     if "sampled_value" not in row:
         return "-"
     return str(as_interval(row["sampled_value"], row["sampled_low"], row["sampled_high"]))
-
-
-def _loses(report: Report) -> str:
-    """What the agent loses at most against the best possible, on a counted table."""
-    row = report.metrics["policies"]["retrained"]
-    if "loses_at_most" not in row:
-        return ""
-    if row["loses_at_most"] is None:
-        return " What the agent loses against the best possible they do not tell."
-    return f" By these the agent loses at most {row['loses_at_most']:.3g} of value against the best possible."
 
 
 def _shown(report: Report) -> str:

@@ -68,6 +68,24 @@ class SamplingError:
         """(n,) a pair (s, a) of the row was never visited."""
         return abs(self.weights) @ (_visits(self.table) == 0) > 0
 
+    def unsettled(self, margins: np.ndarray, V: Vector, among: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
+        """The largest error of some margins of visited pairs, and (n,) which of them are within their error but above rounding.
+
+        Args:
+            margins: (n,) c P V.
+            V: (S,).
+            among: (n,) rows in question.
+            rounding: a margin up to this is none.
+        """
+        errors = self.of_margins(V)
+        largest = float(errors[among & ~self.unvisited].max(initial=0.0))
+        return largest, among & (margins > rounding) & (margins <= errors)
+
+
+def counted_table(error: float | None) -> str:
+    """What is judged on a counted table; with the error of its margins where that is known."""
+    return "a counted table" + ("" if error is None else f", margins within {error:.2g} with 95 % confidence")
+
 
 def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndarray, actions: np.ndarray) -> SamplingError:
     """Compare what an expert does in some states (n,) with an action (n,) each, by the counts of a counted table.

@@ -168,7 +168,9 @@ def test_a_run_on_counts_says_what_its_agent_loses_at_most(tmp_path):
     most = report.metrics["policies"]["retrained"]["loses_at_most"]
     console = Console(record=True, width=300, file=io.StringIO())
     print_report(report, console)
-    assert f"By these the agent loses at most {most:.3g} of value" in " ".join(console.export_text().split())
+    assert f"By episodes that were not counted the agent loses at most {most:.3g} of value" in " ".join(
+        console.export_text().split()
+    )
     page = " ".join(Path(report.page).read_text().split())
     assert "By episodes that were not counted the agent loses at most" in page and 0 < most < 4
 

@@ -173,7 +173,7 @@ SAID = {
         "Probabilities within",
         "value by episodes",
         "a counted table, margins within .* with 95 % confidence",
-        "What the agent loses against the best possible they do not tell",
+        "What the agent loses against the best possible .* do not tell",
     ),
     "noisy": ("expert with its errors = 1", "an optimal action", "judged are the actions most frequent", "none: it gains"),
 }

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irl_gym._typing import Vector
-from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout, told_by_counts
+from irl_gym.certificate import Certificate, comparable, judged, least_per_state, tied_throughout
 from irl_gym.dynamic_programming import backup, policy_iteration
 from irl_gym.learners.soft import PartlyKnown
 from irl_gym.mdp import TabularMDP
@@ -126,7 +126,6 @@ def certify_partly(
         unconstrained=rows[np.setdiff1d(np.flatnonzero(partly.known), c.states[usable])],
         slack=None if terms.slack is None else float(terms.slack),
         unknown=rows[partly.unknown],
-        **judged(mdp, part, rows, c, R, found.margins, short, terms.r_max, terms.unbreakable, visits),
+        **judged(mdp, part, rows, c, R, found.margins, found.V, short, terms.r_max, terms.unbreakable, visits),
         indifferent=tied_throughout(found.margins[partly.active], R, part),
-        **told_by_counts(part, rows, c, R, found.margins, found.V, terms.unbreakable),
     )

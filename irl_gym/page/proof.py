@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.certificate import counted_table
+from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
+from irl_gym.sampling_error import counted_table
 
 GOOD, MUCH = 0.9, 0.05
 """A score that is good, and a share lost by the worst tie that is much."""
@@ -91,16 +92,9 @@ def _counted(run: Run) -> str:
     reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
     if not (run.metrics.get("table") or {}).get("counted"):
         return ""
-    n, lost = reward.get("unsettled_states"), ""
+    n = reward.get("unsettled_states")
     left = f", and in {counted(n, 'state')} a margin is smaller than its error" if n else ""
-    if "loses_at_most" in agent:
-        most = agent["loses_at_most"]
-        lost = (
-            f" By episodes that were not counted the agent loses at most {number(most, 3)} of value against the best possible."
-        )
-        if most is None:
-            lost = " What the agent loses against the best possible episodes that were not counted do not tell."
-    return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{lost}"
+    return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{loss_told(agent)}"
 
 
 def certificate(run: Run) -> Section:

@@ -8,7 +8,9 @@ from counted import counted, episode
 from scipy.stats import poisson
 
 from irl_gym.comparisons import compare
+from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import InvalidMDP
+from irl_gym.learners.feature_certificate import judge_table
 from irl_gym.mdp import TabularMDP
 
 SHAPES = {
@@ -141,3 +143,9 @@ def test_visits_survive_restriction_and_pickling():
 def test_visits_that_are_no_counts_are_refused(visits):
     with pytest.raises(InvalidMDP, match="visits has shape"):
         TabularMDP(np.full((4, 2), 0.5), 0.9, [1, 0], visits)
+
+
+def test_feature_rewards_have_no_margin_within_noise():
+    mdp, policy, R = table(two([520, 480], [480, 520])), np.zeros(60, dtype=int), np.linspace(-1, 1, 60)
+    found = judge_table(mdp, policy, np.ones(60, dtype=bool), R, Discounted(mdp.P_pi(policy), mdp.gamma))
+    assert found.margin[0] == 0

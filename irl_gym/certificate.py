@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import ActionSets, Indices, Numbers, Vector
-from irl_gym.comparisons import Comparisons, compare
+from irl_gym.comparisons import Comparisons, as_compared, compare
 from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
 from irl_gym.dynamic_programming import optimum
@@ -23,6 +23,7 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.optimality import loss_of, told_loss
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
+from irl_gym.sampling_error import counted_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,10 @@ class Certificate(Proven):
     """(v,) how often the row's state was visited; NaN when that is not known."""
     indifferent: bool = False
     """Is the expert tied, to rounding, in every row of (4)?"""
+    sampling_error: float | None = None
+    """The largest error of a margin on a counted table, of pairs that were visited; None where the table is exact."""
+    unsettled: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Reachable states of a counted table in which a margin above 0 is within its sampling error."""
 
     @property
     def degenerate(self) -> bool:
@@ -106,6 +111,10 @@ class Certificate(Proven):
             f"margins                  {span}",
             self.optimality,
         ]
+        if self.sampling_error is not None:
+            lines.append(f"judged on                {counted_table(self.sampling_error)}")
+        if self.unsettled.size:
+            lines.append(f"unsettled                in {self.unsettled.size} states a margin is within its sampling error")
         if np.isfinite(self.least_l1_norm):
             above = max(self.l1_norm - self.least_l1_norm, 0.0)
             lines.append(f"||R||_1                  {self.l1_norm:.6g}, at most {above:.1e} above the least with these margins")
@@ -169,7 +178,7 @@ def certify(
     mdp.mixing(expert)  # checks shape and content for all states
     comparisons = compare(part, np.asarray(expert)[rows])
     R = reward.of_rows(rows)
-    found = optimum(part, R)
+    found = optimum(as_compared(part, comparisons, R.on_states), R)
     margins = margins_of(found, comparisons)
     usable = comparable(comparisons, R)
     spoilt = comparisons.states[comparisons.trivial & ~usable & ~comparisons.equal & (margin_cap is None)]
@@ -227,6 +236,9 @@ def judged(
     which = np.flatnonzero(active & margins.violated(to_both))
     states = rows[comparisons.states[which]].astype(np.int64)
     loss = loss_of(found, comparisons.distribution, unknown)
+    error, unsettled = None, np.zeros_like(kept)
+    if comparisons.sampling is not None:
+        error, unsettled = comparisons.sampling.unsettled(margins.values, margins.worth, kept, margins.none)
     return {
         "expert_optimal": loss.optimal,
         "loss_low": loss.low,
@@ -242,6 +254,8 @@ def judged(
         "marginless": rows[np.unique(comparisons.states[without])],
         "unbreakable": rows[np.unique(comparisons.states[left_out])],
         "unbreakable_rows": _pairs(comparisons, rows, left_out),
+        "sampling_error": error,
+        "unsettled": rows[np.unique(comparisons.states[unsettled])],
         "violated": np.unique(states),
         "violated_rows": _pairs(comparisons, rows, which),
         "violations": violations[which],

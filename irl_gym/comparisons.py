@@ -14,8 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import Matrix, Sparse
-from irl_gym.mdp import TransitionTable
+from irl_gym.mdp import TabularMDP, TransitionTable, entry_rows
 from irl_gym.policies import as_distribution
+from irl_gym.sampling_error import SamplingError, sampling_error
 
 ROUNDING = 1e-14
 SAME_SUCCESSORS = 1e-12  # largest difference between two rows of P that are the same but for rounding
@@ -26,7 +27,7 @@ class Comparisons:
     """The expert's successors minus another action's, one row for each state and action compared."""
 
     rows: Sparse
-    """(n, S) P_pi(s) - P_a(s)."""
+    """(n, S) P_pi(s) - P_a(s); 0 where that is rounding, or sampling noise."""
     states: np.ndarray
     """(n,) state of each row, increasing."""
     actions: np.ndarray
@@ -35,12 +36,22 @@ class Comparisons:
     """(n,) the expert takes this action too: the row is an equality."""
     distribution: Matrix
     """(S, A) the expert."""
+    sampling: SamplingError | None = None
+    """What the counts tell of the rows; None where the table is exact."""
 
     @cached_property
     def trivial(self) -> np.ndarray:
         """(n,) the two actions have the same successors: no reward on states can tell them apart."""
         difference = abs(self.rows)
         return np.asarray(difference.max(axis=1).todense()).ravel() <= SAME_SUCCESSORS
+
+    @property
+    def caveat(self) -> str:
+        """What a sentence that no row tells anything has to add on a counted table; nothing on an exact one."""
+        if self.sampling is None or not self.sampling.same.any():
+            return ""
+        count = int(self.sampling.same.sum())
+        return f" The table is counted: of {count} actions the counts do not tell that they lead elsewhere; more steps may."
 
 
 def compare(table: TransitionTable, expert: Any, among: np.ndarray | None = None) -> Comparisons:
@@ -63,5 +74,27 @@ def compare(table: TransitionTable, expert: Any, among: np.ndarray | None = None
     P_pi = sp.csr_array(table.mixing(distribution)[among] @ table.P)
     rows = sp.csr_array(P_pi[positions] - table.P[states * table.n_actions + actions])
     rows.data[np.abs(rows.data) <= ROUNDING] = 0.0  # what both actions share cancels, but for rounding
+    sampling = None if table.visits is None else sampling_error(table, distribution, states, actions)
+    if sampling is not None:
+        rows.data[sampling.same[entry_rows(rows)]] = 0.0
     rows.eliminate_zeros()
-    return Comparisons(rows, states, actions, taken[positions, actions], distribution)
+    return Comparisons(rows, states, actions, taken[positions, actions], distribution, sampling)
+
+
+def as_compared(mdp: TabularMDP, comparisons: Comparisons, on_states: bool) -> TabularMDP:
+    """The MDP in which actions that the counts do not tell from the expert's lead where its own do: the table itself if exact.
+
+    Args:
+        mdp: of which the rows are.
+        comparisons: the rows of (4).
+        on_states: is a reward on states judged? One on steps may tell such actions apart.
+    """
+    if comparisons.sampling is None or not on_states or not comparisons.trivial.any():
+        return mdp
+    same = comparisons.trivial & ~comparisons.equal
+    pairs = comparisons.states[same] * mdp.n_actions + comparisons.actions[same]
+    kept = np.ones(mdp.P.shape[0])
+    kept[pairs] = 0.0
+    own = sp.csr_array(mdp.mixing(comparisons.distribution)[comparisons.states[same]])
+    place = sp.csr_array((np.ones(pairs.size), (pairs, np.arange(pairs.size))), shape=(mdp.P.shape[0], pairs.size))
+    return TabularMDP(sp.csr_array((sp.diags_array(kept) + place @ own) @ mdp.P), mdp.gamma, mdp.d0, mdp.visits)

@@ -123,7 +123,7 @@ class Counting:
             method, exact=False, merged=0, split=len(copies), check=None, error=max(counts.largest_error(), start_error)
         )
         reward = TabularReward(payments.mean, {"source": "samples"})
-        table = Tabulation(TabularMDP(P, gamma, d0), reward, payments, states, evidence)
+        table = Tabulation(TabularMDP(P, gamma, d0, visits), reward, payments, states, evidence)
         return CountedTable(table, counts)
 
     def _completed(

@@ -41,11 +41,13 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     sampled.inexpressible,
     truth.poor_expert,
     truth.few_episodes,
+    truth.unconfirmed,
     ties.violated,
     truth.lossy_ties,
     ties.same_successors,
     ties.avoidable_ties,
     ties.unbreakable_ties,
+    ties.unsettled,
     sampled.fell_short,
     sampled.beaten,
     sampled.drowned,
@@ -138,10 +140,14 @@ def _examined(case: Case) -> str:
     if case.mdp is None:
         return "There is no table: only what the certificate says was examined."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
-    margins = case.margins
-    if case.rows is None or not margins.size:
+    where += ", on a counted table" if case.counted else ""
+    beyond = case.beyond.copy()
+    if case.rows is None or not beyond.any():
         return f"Examined: {where}."
-    judged = int(np.isfinite(case.least).sum())
+    beyond[case.rows.states[case.unsettled]] = False
+    margins, judged = case.least[beyond], int(np.isfinite(case.least).sum())
+    if not margins.size:
+        return f"Examined: {where}. No margin of {judged:,} states is beyond its sampling error."
     return (
         f"Examined: {where}. The reward prefers the expert's action in {margins.size:,} of {judged:,} that it can judge, by "
         f"{margins.min():.3g} to {margins.max():.3g}."

@@ -9,7 +9,9 @@ import numpy as np
 
 from irl_gym import metrics
 from irl_gym._typing import ActionSets
+from irl_gym.confirmation import loss_by_episodes, value_by_episodes
 from irl_gym.curves import Curve, read_curve, two_returns
+from irl_gym.demonstrations import Episode
 from irl_gym.discounted import EPSILON
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import optimum
@@ -58,6 +60,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
             "agreement": metrics.agreement(world.table.mdp, policy, agreed)
             if isinstance(world, TableWorld) and agreed is not None and not told
             else None,
+            **_confirmed(world, episodes, lost=name == "retrained"),
         }
     expert, random = (returns_of(rows[name]) for name in ("expert", "random"))
     for row in rows.values():
@@ -78,6 +81,18 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         "table": _table(world) if isinstance(world, TableWorld) else None,
         "demonstrations": _recorded(loop),
     }
+
+
+def _confirmed(world: Any, episodes: list[Episode], *, lost: bool) -> dict[str, float | None]:
+    """What fresh episodes say of a value that a counted table gives, and of what is lost against the best; else nothing."""
+    if not isinstance(world, TableWorld) or world.table.mdp.visits is None or not episodes:
+        return {}
+    value = value_by_episodes(world.table, episodes, world.horizon)
+    low, high = value.ends
+    told = {"sampled_value": value.estimate, "sampled_low": low, "sampled_high": high}
+    if lost and world.horizon is None:
+        told["loses_at_most"] = loss_by_episodes(world.table, episodes).ends[1]
+    return told
 
 
 def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
@@ -197,7 +212,7 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
-STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "violated")
+STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 
@@ -207,6 +222,7 @@ def _table(world: TableWorld) -> dict[str, Any]:
         "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "error": evidence.error,
+        "counted": mdp.visits is not None,
         "method": evidence.method,
         "check": None if evidence.check is None else dict(vars(evidence.check)),
     }  # fmt: skip

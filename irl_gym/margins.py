@@ -54,6 +54,8 @@ class Margins:
     """(n,) they are within this of the exact ones."""
     none: np.ndarray
     """(n,) a margin or a violation up to this is none: the rounding of the table's numbers, and what the solver of R left."""
+    worth: Vector
+    """(S,) what arriving in a state is worth: the margins are differences of its means."""
 
     def violations(self, equal: np.ndarray) -> np.ndarray:
         """(n,) by how much a row is violated; rows that are `equal` (n,) to either side."""
@@ -73,8 +75,9 @@ def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None
 
     `tolerance` is what the solver of R left open; None for the reward's own.
     """
-    low, high = found.less_than(*found.behind(comparisons.distribution))
-    return _margins(found, comparisons, (low + high) / 2, (high - low) / 2, tolerance)
+    behind, unsure = found.behind(comparisons.distribution)
+    low, high = found.less_than(behind, unsure)
+    return _margins(found, comparisons, (low + high) / 2, (high - low) / 2, found.V - behind, tolerance)
 
 
 def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
@@ -82,10 +85,13 @@ def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
     low, high = found.gaps
     gap, wide, mine = (low + high) / 2, (high - low) / 2, comparisons.distribution
     gap = gap - (mine * gap).sum(axis=1, keepdims=True)
-    return _margins(found, comparisons, gap, wide + (mine * wide).sum(axis=1, keepdims=True), None)
+    return _margins(found, comparisons, gap, wide + (mine * wide).sum(axis=1, keepdims=True), found.V, None)
 
 
-def _margins(found: Optimum, comparisons: Comparisons, values: Matrix, unsure: Matrix, tolerance: float | None) -> Margins:
-    at = comparisons.states, comparisons.actions
-    left = found.table.reward.tolerance if tolerance is None else tolerance
-    return Margins(values[at], unsure[at], found.level[at] + left)
+def _margins(
+    found: Optimum, comparisons: Comparisons, values: Matrix, unsure: Matrix, V: Vector, tolerance: float | None
+) -> Margins:
+    at, reward = (comparisons.states, comparisons.actions), found.table.reward
+    left = reward.tolerance if tolerance is None else tolerance
+    worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
+    return Margins(values[at], unsure[at], found.level[at] + left, worth)

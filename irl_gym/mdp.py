@@ -3,8 +3,9 @@
 A `TransitionTable` is what an environment does: P(s' | s, a) and the distribution of the first state. A `TabularMDP` is a
 table with a discount, which no environment carries and which is never guessed.
 
-    P    (S*A, S) CSR, row s * A + a is P(. | s, a)
-    d0   (S,) distribution of the first state
+    P        (S*A, S) CSR, row s * A + a is P(. | s, a)
+    d0       (S,) distribution of the first state
+    visits   (S, A) steps that each row of P was estimated from; None where P is exact
 A state is *terminal* when its A rows are zero: the episode ends on arrival, so nothing comes after. This is the only place
 that says so. Axes: S states, A actions.
 """
@@ -30,12 +31,14 @@ class TransitionTable:
     Args:
         P: (S*A, S), sparse or dense; row s * A + a sums to 1, or to 0 in a terminal state. Duplicates are added up.
         d0: (S,), the distribution of the first state.
+        visits: (S, A) steps that each row of P is the mean of, 0 where a rule made it up; None where P is exact. What the rows
+            cannot tell for that is in `irl_gym.sampling_error`.
 
     Raises:
         InvalidMDP: naming the first offending state and action.
     """
 
-    def __init__(self, P: Any, d0: Any):
+    def __init__(self, P: Any, d0: Any, visits: Any = None):
         self.P: Sparse = _frozen_csr(P)
         self.d0: Vector = _frozen(float_array("d0", d0, "(S,) probabilities", InvalidMDP))
         self.n_states: int = self.P.shape[1]
@@ -46,6 +49,7 @@ class TransitionTable:
             )
         self.n_actions: int = self.P.shape[0] // self.n_states
         self.terminal: StateMask = _frozen(_check_rows(self.P, self.n_states, self.n_actions))
+        self.visits: np.ndarray | None = None if visits is None else _checked_visits(visits, (self.n_states, self.n_actions))
         self._complete = True
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -62,7 +66,7 @@ class TransitionTable:
         return cls(array.reshape(-1, array.shape[2]), *args, **kwargs)
 
     def __reduce__(self) -> tuple:
-        return type(self), (self.P, self.d0)
+        return type(self), (self.P, self.d0, self.visits)
 
     def __repr__(self) -> str:
         counts = f"{self.n_states} states, {self.n_actions} actions, {int(self.terminal.sum())} terminal"
@@ -121,18 +125,19 @@ class TabularMDP(TransitionTable):
         P: (S*A, S), sparse or dense; row s * A + a sums to 1, or to 0 in a terminal state.
         gamma: discount, strictly between 0 and 1.
         d0: (S,), the distribution of the first state.
+        visits: (S, A) steps that each row of P is the mean of; None where P is exact.
 
     Raises:
         InvalidMDP: naming the first offending state and action.
         InvalidDiscount: gamma outside (0, 1).
     """
 
-    def __init__(self, P: Any, gamma: float, d0: Any):
+    def __init__(self, P: Any, gamma: float, d0: Any, visits: Any = None):
         self.gamma: float = check_discount(gamma)
-        super().__init__(P, d0)
+        super().__init__(P, d0, visits)
 
     def __reduce__(self) -> tuple:
-        return type(self), (self.P, self.gamma, self.d0)
+        return type(self), (self.P, self.gamma, self.d0, self.visits)
 
     def restrict(self, rows: Indices) -> "TabularMDP":
         """The MDP of some states only, renumbered in the order given.
@@ -145,7 +150,7 @@ class TabularMDP(TransitionTable):
         start = self.d0[rows]
         if abs(P.sum() - self.P[stacked].sum()) > 1e-6 or abs(start.sum() - 1) > 1e-6:
             raise InvalidMDP(f"the {rows.size} states are not closed: an action or a start leads out of them.")
-        return TabularMDP(P, self.gamma, start)
+        return TabularMDP(P, self.gamma, start, None if self.visits is None else self.visits[rows])
 
 
 def checked_mdp(mdp: Any) -> TabularMDP:
@@ -219,6 +224,16 @@ def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
             "is zero, elsewhere none. Give an action that is not available the rows of one that is."
         )
     return empty.all(axis=1)
+
+
+def _checked_visits(visits: Any, shape: tuple[int, int]) -> np.ndarray:
+    array = np.array(visits)
+    if array.shape != shape or array.dtype.kind not in "iu" or (array < 0).any():
+        raise InvalidMDP(
+            f"visits has shape {array.shape} and dtype {array.dtype}: expected {shape} whole numbers of at least 0, the steps "
+            "that each row of P was estimated from."
+        )
+    return _frozen(array.astype(np.int64))
 
 
 def entry_rows(P: Sparse) -> np.ndarray:

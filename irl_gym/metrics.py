@@ -17,6 +17,7 @@ from irl_gym.howard import OUTWARDS, Optimum
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward, as_reward
+from irl_gym.sampling_error import not_told
 
 TINY = float(np.finfo(np.float64).tiny)
 
@@ -28,7 +29,8 @@ class Ties:
     tied: ActionSets
     """(S, A) as good, to the rounding of the table's own numbers; all in terminal states."""
     undecided: ActionSets
-    """(S, A) neither tied nor worse: what the solver of a learned reward left open, or rounding, hides which."""
+    """(S, A) neither tied nor worse for certain: hidden by what the solver of a learned reward left open, by rounding, or on a
+    counted table by what the counts do not tell."""
 
     @property
     def possible(self) -> ActionSets:
@@ -131,8 +133,11 @@ def ties(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: floa
 def ties_of(found: Optimum, left_open: float) -> Ties:
     """The ties of an optimum under a reward whose solver left differences of action values open up to `left_open`."""
     low, high = found.gaps
-    tied = (high <= found.level) | found.table.mdp.terminal[:, None]
-    return Ties(tied, (low <= found.level + left_open) & ~tied)
+    mdp, reward = found.table.mdp, found.table.reward
+    tied, open_ = (high <= found.level) | mdp.terminal[:, None], found.level + left_open
+    if mdp.visits is not None:  # what the counts leave open between actions of the same successors
+        open_ = open_ + not_told(mdp, found.policy, mdp.gamma * found.V + (reward.values if reward.on_states else 0.0))
+    return Ties(tied, (low <= open_) & ~tied)
 
 
 def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float | None = None) -> ActionSets:
@@ -149,7 +154,8 @@ def worst_tie(
 ) -> Tie:
     """The worst policy under `true` among those greedy under `learned`: dynamic programming over the tied actions.
 
-    Undecided actions count as tied: what a solver left open, an agent may take. Arguments and errors as `ties`.
+    Undecided actions count as tied: what a solver left open, or counts do not tell, an agent may take. Arguments and errors as
+    `ties`.
     """
     allowed = optimal_actions(mdp, learned, tolerance=tolerance)
     worst = policy_iteration(mdp, _negative(true), allowed=allowed)

@@ -10,11 +10,13 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
+from irl_gym.confirmation import loss_told
 from irl_gym.intervals import as_interval
 from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
+from irl_gym.sampling_error import counted_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged
 
@@ -23,7 +25,6 @@ COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 
 ROUNDING = 1e-12
 """A distance from the best possible up to this is none."""
-
 HARM = 1e-6
 """Share of the expert's advantage over random below which a tie costs nothing but rounding."""
 
@@ -81,15 +82,18 @@ def _policies(report: Report) -> Table:
     headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
     known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
     found = judged(report.metrics["policies"], report.metrics["table"])
-    for heading in (*headings.values(), *(("agreement",) if known else ())):
+    confirmed = any("sampled_value" in row for row in report.metrics["policies"].values())
+    more = (("value by episodes (95 %)",) if confirmed else ()) + (("agreement",) if known else ())
+    for heading in (*headings.values(), *more):
         table.add_column(heading, justify="right")
     for name, row in report.metrics["policies"].items():
         score = "-" if row["score"] is None else score_of(row["score"])
         interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
         agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
+        by_episodes = [_by_episodes(row)] if confirmed else []
         whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
         style = COLOURS[found.mood] if name == "retrained" else ""
-        table.add_row(whose, f"{row['value']:.4f}", Text(score, style), Text(interval, style), *agreement)
+        table.add_row(whose, f"{row['value']:.4f}", Text(score, style), Text(interval, style), *by_episodes, *agreement)
     given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
     errs = " with its errors" if only and not given else ""
     table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
@@ -98,12 +102,22 @@ def _policies(report: Report) -> Table:
         table.caption += f" There is no score: {reason}."
     if known:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
+    if confirmed:
+        told = loss_told(report.metrics["policies"]["retrained"])
+        table.caption += f" value by episodes: the same, by episodes that were not counted.{told}"
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
     table.caption += f"\njudged: {found.told}"
     table.caption += _of_training(report)
     table.caption_justify = "left"
     return table
+
+
+def _by_episodes(row: Mapping[str, Any]) -> str:
+    """The value that fresh episodes say a policy has."""
+    if "sampled_value" not in row:
+        return "-"
+    return str(as_interval(row["sampled_value"], row["sampled_low"], row["sampled_high"]))
 
 
 def _shown(report: Report) -> str:
@@ -180,6 +194,11 @@ def _told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> It
     judged = "; judged are the actions most frequent in its episodes" if seen else ""
     optimal = told_record(reward) or (best if reward["expert_optimal"] else _why_not(reward))
     yield "expert optimal under it", f"{optimal}{judged}"
+    if (metrics["table"] or {}).get("counted"):
+        yield "judged on", counted_table(reward.get("sampling_error"))
+    if reward.get("unsettled_states"):
+        told = "there a margin is within its sampling error, and may be noise. Try more steps to count."
+        yield "states the counts leave open", f"{reward['unsettled_states']:,}: {told}"
     if reward.get("unknown_states"):
         of_all = f"{reward['unknown_states']:,} of {metrics['table']['reachable']:,}"
         yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"

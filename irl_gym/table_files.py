@@ -68,6 +68,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
     np.savez(
         beside,
         data=mdp.P.data, indices=mdp.P.indices, indptr=mdp.P.indptr, d0=mdp.d0, gamma=np.array(mdp.gamma),
+        visits=none if mdp.visits is None else mdp.visits,
         reward=table.reward.values, mean=table.payments.mean, deviation=table.payments.deviation,
         entries=none if table.payments.entries is None else table.payments.entries,
         largest=np.array(table.payments.largest),
@@ -110,9 +111,11 @@ def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:
 
 def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
     shape = (found["indptr"].size - 1, found["d0"].size)
+    visits = found.get("visits", np.zeros(0))  # tables of earlier versions have none
     mdp = TabularMDP(
-        sp.csr_array((found["data"], found["indices"], found["indptr"]), shape=shape), float(found["gamma"]), found["d0"]
-    )
+        sp.csr_array((found["data"], found["indices"], found["indptr"]), shape=shape), float(found["gamma"]), found["d0"],
+        visits if visits.size else None,
+    )  # fmt: skip
     entries = found["entries"] if found["entries"].size == mdp.P.nnz else None
     payments = Payments(found["mean"], found["deviation"], entries, float(found["largest"]))
     copies = {int(row): int(copy) for row, copy in found["copies"]}

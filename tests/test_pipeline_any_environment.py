@@ -166,7 +166,14 @@ def test_an_expert_may_be_what_another_run_left(runs, tmp_path, file):
 SAID = {
     "blackjack": ("value: exact", "one of the expert's actions", "reachable states, 2 actions", "expert = 1"),
     "minigrid": ("table: [0-9]+ reachable states, 7 actions. Enumeration of",),
-    "sampled": ("computed on a table that is an estimate", "Counts of 4000 steps", "Probabilities within"),
+    "sampled": (
+        "computed on a table that is an estimate",
+        "Counts of 4000 steps",
+        "Probabilities within",
+        "value by episodes",
+        "a counted table, margins within .* with 95 % confidence",
+        "What the agent loses against the best possible .* do not tell",
+    ),
     "noisy": ("expert with its errors = 1", "an optimal action", "judged are the actions most frequent", "none: it gains"),
 }
 
@@ -177,6 +184,12 @@ def test_the_report_says(runs, name, width):
     text = said(runs(name), 300)
     assert [words for words in SAID[name] if not re.search(words, text)] == [] and "exact on" not in text
     assert said(runs(name), width)
+
+
+def test_the_page_says_that_a_counted_table_judged(runs):
+    text = " ".join(Path(runs("sampled").page).read_text().split())
+    assert "All this is judged on a counted table, margins within" in text and "value by episodes (95 %)" in text
+    assert "counted table" not in Path(runs("deck").page).read_text()
 
 
 # --- killed ---

@@ -13,6 +13,7 @@ from enumeration_envs import Board, Corridor, Lamps, Slippery
 from gymnasium import spaces
 from tiny_env import TableEnv, both_ways, lottery
 
+from irl_gym.counting import Interaction
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.table_files import keep_table, kept_table, load_table, save_table
@@ -41,6 +42,7 @@ TABLES = {
     "enumerated, split": (Jumps, {}),
     "parts": (Lamps, {}),
     "counted": (lambda: Slippery("normal", n=3), {"by": Enumeration(runs=20)}),
+    "counted, from steps": (lambda: gym.make("FrozenLake-v1"), {"by": Interaction(300)}),
 }
 
 
@@ -72,6 +74,7 @@ def test_a_table_comes_back_byte_for_byte(table, name, tmp_path):
         (there.payments.deviation, back.payments.deviation),
     ):  # fmt: skip
         assert a.dtype == b.dtype and a.tobytes() == b.tobytes()
+    assert np.array_equal(there.mdp.visits, back.mdp.visits) and (there.mdp.visits is None) == there.evidence.exact
     assert (back.mdp.gamma, back.evidence, back.payments.largest) == (0.9, there.evidence, there.payments.largest)
 
 

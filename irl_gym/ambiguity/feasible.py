@@ -16,7 +16,7 @@ import numpy as np
 
 from irl_gym._typing import Indices, Matrix, Numbers, StateMask, Vector
 from irl_gym.checks import checked_number, checked_rng, float_array
-from irl_gym.comparisons import Comparisons, compare
+from irl_gym.comparisons import Comparisons, as_compared, compare
 from irl_gym.dynamic_programming import optimum, policy_iteration
 from irl_gym.errors import InvalidParameter
 from irl_gym.howard import as_told
@@ -155,7 +155,8 @@ def membership(
     tolerance = R.tolerance if tolerance is None else tolerance
     tolerance = checked_number("tolerance", tolerance, "a number of at least 0, in units of value, or None", least=0)
     posed = _acting_best(posed, R)
-    c, found = posed.comparisons, optimum(part, R)
+    c = posed.comparisons
+    found = optimum(as_compared(part, c, R.on_states), R)
     margins = margins_of(found, c, tolerance)
     usable = posed.movable(R.on_states)
     violations, held, violated = margins.violations(c.equal), margins.hold(c.equal), margins.violated(c.equal)

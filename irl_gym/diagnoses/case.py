@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym._typing import ActionSets, Indices, Matrix, Numbers, StateMask, Vector
-from irl_gym.comparisons import compare
+from irl_gym.comparisons import as_compared, compare
 from irl_gym.discounted import EPSILON
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import DegenerateExpert, IrlGymError
@@ -51,6 +51,8 @@ class Rows:
     """(n,) a margin or a violation up to this is none."""
     usable: np.ndarray
     """(n,) rows that a reward of this kind can give a margin."""
+    errors: np.ndarray
+    """(n,) sampling errors of the margins; 0 on an exact table."""
 
     @property
     def violations(self) -> np.ndarray:
@@ -194,18 +196,18 @@ class Case:
         keep = self.states
         part = self.mdp.restrict(keep)
         if gamma is not None:
-            part = TabularMDP(part.P, gamma, part.d0)
+            part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
-        nothing = np.full(c.states.size, np.nan)
-        margins = Margins(nothing, nothing, nothing)
+        nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
+        margins = Margins(nothing, nothing, nothing, nothing)
         if self.reward is not None:
-            found = optimum(part, self.reward.of_rows(keep))
+            found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
             # What follows an unknown state is worth what acting best is, as in `learners.soft_certificate`.
             margins = margins_of(found, c) if self.fully_known else best_margins(found, c)
-        usable = ~c.equal & (~c.trivial | (not self.on_states))
-        return Rows(
-            keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins.values, margins.unsure, margins.none, usable
-        )
+            if c.sampling is not None:
+                errors = c.sampling.of_margins(margins.worth)
+        usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
+        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
 
     @cached_property
     def least(self) -> Vector:
@@ -216,13 +218,31 @@ class Case:
         return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
 
     @cached_property
-    def margins(self) -> Numbers:
-        """(m,) the smallest margins of the states in which every row that R can move has one."""
+    def unsettled(self) -> Indices:
+        """(k,) rows with a margin that is within its sampling error; none on an exact table."""
+        if self.rows is None:
+            return np.zeros(0, dtype=np.int64)
+        rows = self.rows
+        return np.flatnonzero(rows.usable & (rows.margins > rows.none) & (rows.margins <= rows.errors))
+
+    @property
+    def counted(self) -> bool:
+        """Is the table an estimate from counts?"""
+        return self.mdp is not None and self.mdp.visits is not None
+
+    @cached_property
+    def beyond(self) -> StateMask:
+        """(S,) states in which every row that R can move has a margin."""
         if self.rows is None or self.mdp is None or self.reward is None:
-            return np.zeros(0)
+            return np.zeros_like(self.acting)
         usable = self.rows.usable
         left = least_per_state((self.rows.margins - self.rows.none)[usable], self.rows.states[usable], self.mdp.n_states)
-        return self.least[left > 0]
+        return left > 0
+
+    @property
+    def margins(self) -> Numbers:
+        """(m,) their smallest margins."""
+        return self.least[self.beyond]
 
     @cached_property
     def prefers(self) -> bool:

@@ -64,11 +64,12 @@ def same_successors(case: Case) -> Finding | None:
     which = np.flatnonzero(tied)
     if not which.size:
         return None
-    harm = "but not the same true reward" if case.true is not None else "which does no harm only if they also cost the same"
-    told = (
-        f"In {{states}} an action leads where the expert's own leads, {harm}: {{where}}. No reward on states tells them apart."
-    )
-    return _found("same-successors", told, ('reward_on="state-action".', on_steps(case)), rows, which)
+    paid = "but not, as counted, the same true reward" if case.counted else "but not the same true reward"
+    harm = paid if case.true is not None else "which does no harm only if they also cost the same"
+    where = "where the expert's own leads, as far as the counts tell" if case.counted else "where the expert's own leads"
+    told = f"In {{states}} an action leads {where}, {harm}: {{where}}. No reward on states tells them apart."
+    mend = 'reward_on="state-action"; more steps to count, where they do lead elsewhere.' if case.counted else None
+    return _found("same-successors", told, (mend or 'reward_on="state-action".', on_steps(case)), rows, which)
 
 
 def _marginless(case: Case, rows: Rows) -> np.ndarray:
@@ -98,6 +99,21 @@ def unbreakable_ties(case: Case) -> Finding | None:
         mend = told, on_steps(case)
     told = f"In {{states}} no {kind} under which the expert is optimal everywhere prefers its action to another: {{where}}."
     return _found("unbreakable-ties", told, mend, rows, which)
+
+
+def unsettled(case: Case) -> Finding | None:
+    """A margin on a counted table is one only where it exceeds its sampling error (`irl_gym.sampling_error`)."""
+    rows, which = case.rows, case.unsettled
+    if rows is None or not (case.judges_states and case.speaks) or not which.size:
+        return None
+    which = which[np.argsort(rows.margins[which] - rows.errors[which], kind="stable")]
+    told = (
+        f"The table is counted, and in {{states}} the expert's margin over another action is within what the counts leave "
+        f"open, {rows.errors[which].min():.2g} to {rows.errors[which].max():.2g}, so that it may be noise: {{where}}."
+    )
+    more = "More steps to count (`Interaction(steps=...)`, `Enumeration(runs=...)`, episodes): four times as many halve it."
+    mend = more, ("--table sample", "--steps")
+    return _found("within-sampling-error", told, mend, rows, which)
 
 
 def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:

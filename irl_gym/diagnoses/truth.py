@@ -86,6 +86,26 @@ def few_episodes(case: Case) -> Finding | None:
     )
 
 
+def unconfirmed(case: Case) -> Finding | None:
+    """A counted table is an estimate: what it says a policy earns is confirmed by episodes that were not counted, or not."""
+    rows = case.judged.get("policies") or {}
+    for name, row in rows.items():
+        low, high = row.get("sampled_low"), row.get("sampled_high")
+        if low is None or high is None:
+            continue
+        value, much = row["value"], MUCH * abs(rows["expert"]["value"] - rows["random"]["value"])
+        if max(value - high, low - value) > much:
+            whose = {"retrained": "the retrained agent", "random": "a random policy"}.get(name, "the expert")
+            return Finding(
+                "table-not-confirmed",
+                f"By the counted table {whose} earns {value:.4g}, by episodes that were not counted {row['sampled_value']:.4g} "
+                f"({low:.4g} to {high:.4g}): what is planned and judged on this table is off by more than noise.",
+                "More steps to count. If it stays, the observation hides part of the state.",
+                flags=("--table sample", "--steps"),
+            )
+    return None
+
+
 def lossy_ties(case: Case) -> Finding | None:
     """The worst policy among those greedy under R, under the true reward (`metrics.worst_tie`): what an agent may find.
 

@@ -85,7 +85,7 @@ def _choices_vanish(case: Case, gamma: float | None) -> np.ndarray | None:
     """Acting states in which the best and the worst action differ by less under the true reward."""
     if case.true is None or case.mdp is None:
         return None
-    mdp = case.mdp if gamma is None else TabularMDP(case.mdp.P, gamma, case.mdp.d0)
+    mdp = case.mdp if gamma is None else TabularMDP(case.mdp.P, gamma, case.mdp.d0, case.mdp.visits)
     Q = policy_iteration(mdp, case.true).Q[case.acting]
     return np.asarray(Q.max(axis=1) - Q.min(axis=1) <= VANISHED * case.true.largest(mdp))
 

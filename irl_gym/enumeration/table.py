@@ -11,7 +11,7 @@ import os
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from irl_gym.enumeration.trials import OutsideRandomness
 from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
+from irl_gym.mdp import TabularMDP
 from irl_gym.reveal import known_hidden
 from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
 
@@ -209,7 +210,12 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) 
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, len(copies), looked))
+    found = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, len(copies), looked))
+    if explored.counted["rows"] <= 1:  # none, or first states alone
+        return found
+    mdp = found.mdp  # which rows were counted is not kept: all are taken to be, and from the fewest runs
+    visits = np.where(mdp.terminal[:, None], 0, np.full((mdp.n_states, A), explored.counted["fewest"]))
+    return replace(found, mdp=TabularMDP(mdp.P, gamma, mdp.d0, visits))
 
 
 def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
-from irl_gym.comparisons import compare
+from irl_gym.comparisons import as_compared, compare
 from irl_gym.dynamic_programming import optimum
 from irl_gym.margins import least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
@@ -132,8 +132,9 @@ def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: Tabular
     """
     rows = np.flatnonzero(mdp.reachable)
     part, distribution = mdp.restrict(rows), as_distribution(expert, mdp.n_states, mdp.n_actions)[rows]
-    found, seen = optimum(part, reward.of_rows(rows)), known[rows] | part.terminal
+    seen = known[rows] | part.terminal
     c = compare(part, distribution, np.flatnonzero(seen))
+    found = optimum(as_compared(part, c, True), reward.of_rows(rows))
     margins = margins_of(found, c)
     left_out = np.isin(rows[c.states] * mdp.n_actions + c.actions, ties @ [mdp.n_actions, 1])
     kept = ~c.equal & ~left_out

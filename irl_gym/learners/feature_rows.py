@@ -163,7 +163,7 @@ def rows_of_table(
     if not kept.any():
         raise DegenerateExpert(
             f"none of the {S_0.size} states of S_0 compares the expert with an action of other successors: every reward on "
-            "states makes it optimal there. Choose a larger S_0."
+            f"states makes it optimal there. Choose a larger S_0.{comparisons.caveat}"
         )
     kept = kept | (printed & ~comparisons.equal)
     d = np.empty((int(kept.sum()), features.n_features))

@@ -259,7 +259,7 @@ class _Task:
         if (c.equal | c.trivial).all():
             return DegenerateExpert(
                 f"none of {where} compares the expert with an action of other successors: every reward on states makes it "
-                'optimal. Use reward_on="state-action".'
+                f'optimal. Use reward_on="state-action".{c.caveat}'
             )
         return DegenerateExpert(
             f"each of {where} has an action with the expert's own successors, which takes its margin in the paper's LP. Use "
@@ -272,6 +272,7 @@ class _Task:
         return DegenerateExpert(
             f"equation (4) holds for this expert only with every margin 0, as for R = constant: no {where} over the "
             f"{self.rows.size} reachable states prefers its actions. Is the policy optimal for any reward at all?{mend}"
+            f"{self.comparisons.caveat if self.learner.reward_on == 'state' else ''}"
         )
 
     def result(self, solved: Solved, **proof: Any) -> IRLResult[TabularReward, Certificate]:

@@ -80,7 +80,7 @@ class PartialTask:
             mend = ' Use reward_on="state-action".' if on_states else ""
             raise DegenerateExpert(
                 f"none of the {known.sum()} reachable states where the expert is known compares it with an action of other "
-                f"successors that it leaves out: every reward makes it optimal.{mend}"
+                f"successors that it leaves out: every reward makes it optimal.{mend}{c.caveat}"
             )
 
     def program(self, *, soft: bool) -> SoftProgram:

@@ -14,6 +14,7 @@ import numpy as np
 
 from irl_gym._typing import Vector
 from irl_gym.certificate import Certificate, judged
+from irl_gym.comparisons import as_compared
 from irl_gym.dynamic_programming import optimum
 from irl_gym.howard import Optimum
 from irl_gym.learners.soft import PartlyKnown
@@ -51,7 +52,7 @@ class Judged:
 def judge(partly: PartlyKnown, R: TabularReward, r_max: float) -> Judged:
     """The rows of (4) under a reward on the reachable part."""
     mdp, c = partly.mdp, partly.comparisons
-    found = optimum(mdp, R)
+    found = optimum(as_compared(mdp, c, R.on_states), R)
     gap = np.maximum(-found.advantages.values.astype(np.float64), 0.0)
     loss = np.where(mdp.terminal, 0.0, (c.distribution * gap).sum(axis=1))
     count = 1 if R.on_states else mdp.n_actions

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import told_record
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
+from irl_gym.sampling_error import counted_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged, returns_of
 
@@ -54,7 +56,7 @@ def verdict(run: Run) -> dict[str, Any]:
             "label": "expert optimal under it",
             "value": answer(optimal),
             "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
-            "mood": "bad" if optimal is False or reward.get("degenerate") else "good" if optimal else "plain",
+            "mood": _mood(optimal, reward),
         },
     ]
     return {
@@ -75,6 +77,13 @@ def _returns(run: Run) -> str:
 
 def _mean(found: Interval | None) -> str:
     return number(None if found is None else found.estimate)
+
+
+def _mood(optimal: bool | None, reward: Mapping[str, Any]) -> str:
+    """Of whether the expert is optimal: not good where the reward says nothing or a counted table leaves margins open."""
+    if optimal is False or reward.get("degenerate"):
+        return "bad"
+    return "good" if optimal and not reward.get("unsettled_states") else "plain"
 
 
 def answer(optimal: bool | None) -> str:
@@ -117,7 +126,17 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool 
     certified = "whether the expert is optimal under it is undecided"
     if optimal is not None:
         certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
-    return f"{earned}{tie}; {certified}."
+    return f"{earned}{tie}; {certified}.{_counted(run)}"
+
+
+def _counted(run: Run) -> str:
+    """What the verdict rests on, where the table is counted; nothing where it is exact."""
+    reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
+    if not (run.metrics.get("table") or {}).get("counted"):
+        return ""
+    n = reward.get("unsettled_states")
+    left = f", and in {counted(n, 'state')} a margin is smaller than its error" if n else ""
+    return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{loss_told(agent)}"
 
 
 def certificate(run: Run) -> Section:
@@ -136,6 +155,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
     yield "Expert optimal under the reward", optimal
+    if (run.metrics.get("table") or {}).get("counted"):
+        yield "Judged on", counted_table(reward.get("sampling_error"))
     if held.get("degenerate"):
         yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)
@@ -176,6 +197,7 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
 _COUNTS = {
     "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
     "marginless": ("Without a margin", "the expert is only tied with another action"),
+    "unsettled": ("Left open by the counts", "a margin of the expert is within its sampling error, and may be noise"),
     "unbreakable": ("Always tied", "some action ties with the expert's under every such reward that makes the expert optimal"),
     "unknown": ("Expert not seen", "nothing is asked of its actions there"),
     "violated": ("Violated", "another action is better there under the learned reward"),

@@ -88,12 +88,15 @@ def policies_table(run: Run) -> Section:
         f"Value: discounted, from the start, {where}. Score: random actions are 0, the expert is 1. Mean return: undiscounted, "
         "sampled, with a 95 % interval."
     )
+    confirmed = any(row["by_episodes"] for row in rows)
+    if confirmed:
+        note += " Value by episodes: the same, by episodes that were not counted, with a 95 % interval."
     told = run.metrics.get("expert_value") or {}
     if told.get("episodes"):
         note += f" The expert's value is the mean of its {told['episodes']:,} episodes."
     if known:
         note += " Agreement: share of states with one of the expert's actions, or an optimal one where it is optimal."
-    shown = {"rows": rows, "known": known, "note": note}
+    shown = {"rows": rows, "known": known, "confirmed": confirmed, "note": note}
     return Section(
         "summary", "Under the true reward", "What each policy is worth in the environment as it is.", (), "summary", shown
     )
@@ -110,5 +113,6 @@ def policy_row(name: str, row: Mapping[str, Any]) -> dict[str, str]:
         "value": number(row["value"]),
         "score": score_of(row["score"]),
         "returns": interval(row),
+        "by_episodes": interval(row, "sampled_value", "sampled_low", "sampled_high") if "sampled_value" in row else "",
         "agreement": "none" if row["agreement"] is None else percent(row["agreement"]),
     }

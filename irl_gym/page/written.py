@@ -56,9 +56,9 @@ def percent(share: Any) -> str:
     )
 
 
-def interval(row: Mapping[str, Any]) -> str:
-    """A mean return with its 95 % interval."""
-    return with_ends(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
+def interval(row: Mapping[str, Any], *keys: str) -> str:
+    """A mean with its 95 % interval, by the keys of estimate and ends; the mean return where none are given."""
+    return with_ends(as_interval(*(row[key] for key in keys or ("mean_return", "return_low", "return_high"))))
 
 
 def with_ends(found: Interval, how: Callable[[Any], str] = number) -> str:

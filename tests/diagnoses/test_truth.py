@@ -4,7 +4,8 @@ import numpy as np
 from models import paper_grid
 from patients import corridor, finding, judged, names, right
 
-from irl_gym.diagnosis import doctor
+from irl_gym.diagnoses.case import Case
+from irl_gym.diagnosis import diagnose, doctor
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
@@ -84,3 +85,17 @@ def test_the_mend_of_the_worst_tie_is_not_what_the_run_has(toy_text):
 def test_the_expert_of_a_corridor_is_healthy_under_its_goal():
     mdp = corridor(6, 0.9)
     assert names(judged(mdp, right(mdp), np.eye(6)[5]), mdp, right(mdp), true=np.eye(6)[5]) == ()
+
+
+def _judged(value, low, high):
+    told = {"sampled_value": (low + high) / 2, "sampled_low": low, "sampled_high": high}
+    rows = {"expert": {"value": value, **told}, "random": {"value": 0.0}, "retrained": {"value": value}}
+    return diagnose(Case(judged={"policies": rows}, claims={"gaps": []})).names
+
+
+def test_a_counted_table_that_episodes_do_not_confirm_is_told():
+    assert "table-not-confirmed" in _judged(1.0, 0.7, 0.9)
+
+
+def test_a_counted_table_that_is_off_by_noise_is_not_told():
+    assert "table-not-confirmed" not in _judged(1.0, 0.7, 0.99)

@@ -57,6 +57,10 @@ class Explored:
         """How often what happened, by the names of COUNTED."""
         self.always: tuple[str, ...] = ()
         """Attributes that belong to the inner state however large they are."""
+        self.outside = ""
+        """What it draws from that is not its own, so that all is counted; empty for nothing."""
+        self.resets = 0
+        """Resets whose walks were compared with the table, where resets are counted."""
         self.keys: list[Hashable] = []
         self._whole = (0, 0, 0, dict(self.counted))
 
@@ -126,7 +130,7 @@ class Explored:
         np.savez(
             beside,
             identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(counted)),
-            always=np.array(json.dumps(self.always)),
+            always=np.array(json.dumps(self.always)), outside=np.array(self.outside), resets=np.array(self.resets),
             states=numbers_of_keys(space, self.keys[:n]), ends=ends,
             parents=np.array(self.parents[:n]), actions=np.array(self.actions[:n]),
             script_lengths=np.array([len(script) for script in scripts], dtype=np.int64),
@@ -190,5 +194,6 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) 
     explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
     explored.counted |= dict(json.loads(str(found["counted"])))
     explored.always = tuple(json.loads(str(found["always"])))
+    explored.outside, explored.resets = str(found["outside"]), int(found["resets"])
     explored.settle()
     return explored

@@ -60,7 +60,7 @@ def walk_on(explorer: "Explorer", seconds: float) -> None:
     """
     latest = time.monotonic() + max(SECONDS, SHARE * seconds)
     left, trials = STEPS, explorer.trials
-    least = RESETS if explorer.starts_counted else 0
+    least = RESETS if explorer.explored.starts_counted else 0
     for walk in range(WALKS):
         seed = [explorer.limits.seed, walk, len(explorer.explored.keys)]
 
@@ -102,7 +102,7 @@ def _steps(explorer: "Explorer", seed: list[int], keep: int | None) -> Iterator[
         key = explorer.key(observation)
         known = explored.ends.get(key) if ended else explored.ids.get(key)
         successor = None if known is None else -1 - known if ended else known
-        sure = number >= explorer.known_from and number * explorer.n_actions + action not in explorer.counted_rows
+        sure = number * explorer.n_actions + action not in explored.sampled
         possible = not sure or any(_is(line, action, successor, reward) for line in lines)
         yield Step(number, list(way) if not possible else way, possible, inner)
         way.append(action)

@@ -61,10 +61,6 @@ class Explorer:
         self._doubts: deque[tuple[int, Any, Way]] = deque()
         self._held = 0
         self.explored = explored or Explored(self.n_actions)
-        self.counted_rows: set[int] = set()
-        """Pairs (s, a) whose lines are counts, as far as this search knows; an earlier one did not keep them."""
-        self.known_from = 0 if explored is None or not explored.counted["rows"] else explored.n_expanded
-        """The first state of which that is known."""
         self.replays = Replays(self.explored, self.trials, self.space, self.key)
         self._continued = explored is not None
         self._on_states, self._began = on_states, time.monotonic()
@@ -74,11 +70,6 @@ class Explorer:
         else:
             self._continue()
             self._began, self.trials.pulse = time.monotonic(), self._pulse
-
-    @property
-    def starts_counted(self) -> bool:
-        """Was the reset counted, since its draws cannot be listed?"""
-        return any(self.explored.scripts[number][:1] == (-1,) for number in self.explored.starts)
 
     def expand(self) -> Iterator[None]:
         """Expand one state after the other, until none waits or a limit is reached.
@@ -103,7 +94,7 @@ class Explorer:
             self._check_limits(time.monotonic() - self._began)
             yield
         more = self._continued or any(times >= self.limits.revisits for times in self._revisits.values())
-        more = more or self.starts_counted
+        more = more or explored.starts_counted
         if more and self.limits.revisits and not self.trials.counting:
             walk_on(self, time.monotonic() - self._began)
 
@@ -132,7 +123,7 @@ class Explorer:
         seen = self.trials.outcomes(self.trials.step(state, action), row, self._keep, runs=self.limits.runs)
         self._count(seen)
         if seen.runs:
-            self.counted_rows.add(row)
+            self.explored.sampled.add(row)
         self.explored.counted["truncated"] += self.trials.truncated > truncated
         for one in seen.all:
             (_, reward, terminated), (key, reached) = one.result, one.made

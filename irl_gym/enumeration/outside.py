@@ -13,7 +13,6 @@ A clock, the system's entropy or a generator elsewhere leaves no mark: it is fou
 import random
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from ctypes import string_at
 from typing import Any
 
@@ -139,17 +138,3 @@ def shared_mark() -> tuple[Any, Any]:
     if type(shared) is np.random.MT19937:
         return (plain[0], plain[-1], stored), string_at(shared.ctypes.state_address, WORDS)
     return (plain[0], plain[-1], stored), repr(shared.state)
-
-
-@contextmanager
-def seeded_globals(seed: list[int]) -> Iterator[None]:
-    """Seed the generators that NumPy and Python share, for a while: some environments draw from them."""
-    number = int(np.random.SeedSequence(seed).generate_state(1)[0])
-    legacy, plain = np.random.get_state(), random.getstate()  # noqa: NPY002 (theirs, not ours)
-    np.random.seed(number)  # noqa: NPY002
-    random.seed(number)
-    try:
-        yield
-    finally:
-        np.random.set_state(legacy)  # noqa: NPY002
-        random.setstate(plain)

@@ -11,7 +11,7 @@ import os
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,8 @@ from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.reveal import known_hidden
-from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
+from irl_gym.tabulation import Evidence, Lines, Samples, Tabulation, from_lines
+from irl_gym.value_error import with_errors
 
 OnStates = Callable[[int, int], None]
 """Called with the number of states tried and found, as the search goes on."""
@@ -82,7 +83,7 @@ class Enumeration(Limits):
         """
         ranges(env.observation_space)  # refuses floats before anything is copied
         explored = self._explore(env, progress or (lambda tried, found: None))
-        return _assembled(explored, env, gamma, looked=self.revisits > 0)
+        return _assembled(explored, env, gamma, self)
 
     def _explore(self, env: gym.Env, on_states: OnStates) -> Explored:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
@@ -184,7 +185,7 @@ def _mend(env: gym.Env) -> str:
     )
 
 
-def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) -> Tabulation:
+def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -> Tabulation:
     """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
     space = env.observation_space
     only_ends = [key for key in explored.ends if key not in explored.ids]
@@ -209,7 +210,17 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) 
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    return from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, len(copies), looked))
+    evidence = _evidence(explored, len(copies), limits.revisits > 0)
+    made = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=evidence)
+    if evidence.exact:
+        return made
+    visits = np.full(states.n_states * A, np.inf)
+    sampled = np.array(sorted(explored.sampled), dtype=np.int64)
+    visits[place[sampled // A] * A + sampled % A] = limits.runs
+    starts = limits.start_runs if explored.starts_counted else math.inf
+    paid = min(explored.rewards), max(explored.rewards)
+    samples = Samples(visits.reshape(states.n_states, A), made.mdp.P.data, starts, paid)
+    return with_errors(replace(made, samples=samples))
 
 
 def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:

@@ -12,12 +12,12 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.calls import called, stepped
+from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.draws import Draws
 from irl_gym.enumeration.explored import Script
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.outside import OutsideRandomness, Watch, seeded_globals
+from irl_gym.enumeration.outside import OutsideRandomness, Watch
 from irl_gym.errors import NotEnumerable
 
 REPLAYED = 50

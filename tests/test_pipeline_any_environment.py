@@ -128,7 +128,7 @@ def test_returns_are_those_of_the_environment(runs, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_table_is_exact_unless_it_was_sampled(runs, name):
     table = runs(name).metrics["table"]
-    assert table["exact"] == (name != "sampled") and (table["check"] is None) == (name == "sampled")
+    assert table["exact"] == (name != "sampled") and bool(table["check"]["episodes"]) == (name == "sampled")
 
 
 def test_what_is_hidden_is_in_the_dataset(runs):
@@ -167,7 +167,15 @@ def test_an_expert_may_be_what_another_run_left(runs, tmp_path, file):
 SAID = {
     "blackjack": ("value: exact", "one of the expert's actions", "reachable states, 2 actions", "expert = 1"),
     "minigrid": ("table: [0-9]+ reachable states, 7 actions. Enumeration of",),
-    "sampled": ("computed on a table that is an estimate", "Counts of 4000 steps", "Probabilities within"),
+    "sampled": (
+        "computed on a table that is an estimate",
+        "Counts of 4000 steps",
+        "Probabilities within",
+        "sampling noise",
+        "by the table",
+        "Hidden state none seen",
+        "fresh episodes",
+    ),
     "noisy": ("expert with its errors = 1", "an optimal action", "judged are the actions most frequent", "none: it gains"),
 }
 

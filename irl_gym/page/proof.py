@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.diagnoses.spoken import usable_flags, with_names
+from irl_gym.estimated import errors_told, told_by_episodes
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -214,14 +215,19 @@ def table_facts(run: Run) -> Section:
         ("Transitions", f"{told['transitions']:,}"),
     ]
     if "exact" in told:
-        off = told.get("error")
-        sure = "not exact" if off is None else f"within {number(off, 2)}, with 95 % confidence"
-        lines.append(("Probabilities", "exact" if told["exact"] else sure))
+        off = errors_told(told) or {"probabilities": "exact"}
+        lines += [(name.capitalize(), words) for name, words in off.items()]
         lines.append(("Where from", str(told.get("method", ""))))
+    if told.get("hidden_state"):
+        lines.append(("Hidden state", str(told["hidden_state"])))
+    if compared := told_by_episodes(run.metrics["policies"]):
+        lines.append(("Values by episodes", compared))
     if told.get("split"):
         lines.append(("Split", f"{counted(told['split'], 'state')} both ordinary and terminal"))
     check = told.get("check")
-    if check:
+    if check and check.get("episodes"):
+        lines.append(("Checked", str(told["checked"])))
+    elif check:
         lines.append(
             ("Checked", f"{check['steps']:,} steps of the environment, no contradiction; p = {number(check['p_value'], 2)}")
         )

@@ -19,7 +19,6 @@ import gymnasium as gym
 import numpy as np
 from scipy.stats import chi2
 
-from irl_gym.copies.calls import seeded_globals
 from irl_gym.counting import interact
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import TableMismatch, UnknownObservation
@@ -51,8 +50,7 @@ def compare_with_episodes(env: gym.Env, table: Tabulation, samples: Samples, *, 
     """
     begin = int(np.random.SeedSequence([seed, FRESH]).generate_state(1)[0])
     mdp, A = table.mdp, table.mdp.n_actions
-    with seeded_globals([begin]):
-        found = [_rows(table, episode) for episode in interact(copy_of(env), steps, seed=begin)]
+    found = [_rows(table, episode) for episode in interact(copy_of(env), steps, seed=begin)]
     first = np.array([rows[0] for rows, _, _ in found])
     s, following = (np.concatenate([rows[part] for rows, _, _ in found]) for part in (slice(None, -1), slice(1, None)))
     actions, paid = (np.concatenate([one[i] for one in found]) for i in (1, 2))

@@ -20,6 +20,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.blackjack import blackjack_table
 from irl_gym.checks import checked_number
+from irl_gym.copies.calls import seeded_globals
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
 from irl_gym.fresh_episodes import compare_with_episodes
@@ -110,9 +111,10 @@ def tabulate(
 
 def _checked(env: gym.Env, found: Tabulation, steps: int, seed: int) -> SelfCheck | None:
     """What sampling the environment says of a table; None where there is nothing to compare with."""
-    if found.evidence.exact:
-        return compare_with_steps(env, found.mdp, found.states, found.payments, steps=steps, seed=seed)
-    return None if found.samples is None else compare_with_episodes(env, found, found.samples, steps=steps, seed=seed)
+    with seeded_globals([seed]):
+        if found.evidence.exact:
+            return compare_with_steps(env, found.mdp, found.states, found.payments, steps=steps, seed=seed)
+        return None if found.samples is None else compare_with_episodes(env, found, found.samples, steps=steps, seed=seed)
 
 
 def make(env_id: str, **kwargs: Any) -> gym.Env:

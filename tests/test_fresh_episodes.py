@@ -11,6 +11,7 @@ from windy_env import Calm, Windy
 from irl_gym.counting import Counting, Interaction
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import TableMismatch
+from irl_gym.fresh_episodes import _two_samples
 from irl_gym.tabulate import tabulate
 
 pytestmark = pytest.mark.usefixtures("unchecked")
@@ -102,3 +103,15 @@ def test_no_check_is_made_where_none_is_asked_for():
 def test_enumerations_with_counted_rows_are_checked_too(seed):
     told = check(Calm(), Enumeration(runs=100, start_runs=100, seed=seed), seed=seed)
     assert told.episodes > 0 and told.new_steps < 5 and told.p_value > 1e-6
+
+
+@pytest.mark.parametrize(("n", "m"), [(1_000, 1_000), (2_000, 100), (100, 2_000), (np.inf, 300)])
+def test_the_statistic_of_two_samples_is_chi_square_on_its_degrees_of_freedom(n, m):
+    rng, p = np.random.default_rng(0), np.array([0.5, 0.2, 0.1, 0.1, 0.05, 0.03, 0.01, 0.01])
+    found = []
+    for _ in range(500):
+        shares = rng.multinomial(n, p) / n if np.isfinite(n) else p
+        seen = np.flatnonzero(shares)
+        found.append(_two_samples(rng.choice(8, m, p=p), seen, shares[seen], float(n)))
+    statistic, degrees = np.sum(found, axis=0)
+    assert abs(statistic - degrees) < 5 * np.sqrt(2 * degrees) and degrees >= 2 * 500

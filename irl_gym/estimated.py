@@ -38,10 +38,10 @@ def told_by_episodes(policies: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def evidence_told(evidence: Evidence) -> dict[str, Any]:
-    """The errors of a table, hidden state and the check, in numbers and in words, as json holds them."""
+    """The errors of a table, hidden state and the check, in numbers and in words, as json holds them, errors in their order."""
     return {
         "error": evidence.error, "reward_error": evidence.reward_error, "value_error": evidence.value_error,
-        "errors": {} if evidence.exact else evidence.errors(),
+        "errors": [] if evidence.exact else [list(one) for one in evidence.errors().items()],
         "hidden_state": None if evidence.repeats is None else str(evidence.repeats),
         "check": None if evidence.check is None else dict(vars(evidence.check)),
         "checked": None if evidence.check is None else str(evidence.check),

@@ -24,8 +24,8 @@ from irl_gym.copies.stripped import layers
 
 UNSEEN = "a clock, or a generator that nothing of the environment's holds"
 PYTHONS = "the module random"
-SUSPECTS, RARELY = 500, 50
-"""Times that is looked at who draws from it; of later times, each fiftieth."""
+SUSPECTS, RARELY = 20, 100
+"""Times that is looked at who draws from it, which is slow; of later times, each hundredth."""
 WORDS = 4 * 625
 """Bytes of a Mersenne Twister: its words, and the place among them."""
 

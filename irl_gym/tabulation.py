@@ -60,8 +60,8 @@ class Evidence:
             return {"sampling noise": "not bounded, since observations hide state: show it with `irl_gym.reveal.Reveal`"}
         if self.error is None:
             return {"probabilities": "off by an amount that is not known"}
-        sure = f"with 95 % confidence, if observations hide no state{'' if self.repeats is None else ' that lasts'}"
-        told = {"probabilities": f"within {self.error:.2g} for sampling noise, {sure}"}
+        sure = f"within {self.error:.2g} for sampling noise, with 95 % confidence, if observations hide no state"
+        told = {"probabilities": sure}
         for name, off in (("mean rewards", self.reward_error), ("values planned on it", self.value_error)):
             if off is not None:
                 told[name] = f"within {off:.2g}, likewise"

@@ -92,4 +92,4 @@ def test_enumerations_with_counted_rows_have_errors_too_and_exact_ones_none():
 
 def test_the_bound_on_probabilities_is_told_as_one_on_sampling_noise():
     told = str(walked(3_000, 0)[0].evidence)
-    assert "for sampling noise, with 95 % confidence, if observations hide no state that lasts" in told
+    assert "for sampling noise, with 95 % confidence, if observations hide no state" in told

@@ -13,7 +13,7 @@ from irl_gym.curves import Curve, read_curve, two_returns
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import policy_iteration, tied
 from irl_gym.errors import NotTabular, UndefinedDistance
-from irl_gym.estimated import by_episodes, evidence_told
+from irl_gym.estimated import evidence_told
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import support
@@ -52,7 +52,6 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
             "mean_return": mean.estimate,
             "return_low": low,
             "return_high": high,
-            "by_episodes": by_episodes(episodes, world.gamma) if _estimated(world) and not told else None,
             "agreement": metrics.agreement(world.table.mdp, policy, agreed)
             if isinstance(world, TableWorld) and agreed is not None and not told
             else None,
@@ -73,11 +72,6 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         "table": _table(world) if isinstance(world, TableWorld) else None,
         "demonstrations": _recorded(loop),
     }
-
-
-def _estimated(world: Any) -> bool:
-    """Are values those of a table that is an estimate?"""
-    return isinstance(world, TableWorld) and not world.table.evidence.exact
 
 
 def _scale(loop: "Loop", earned: np.ndarray) -> Scale:

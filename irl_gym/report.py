@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
-from irl_gym.estimated import errors_told, told_by_episodes
+from irl_gym.estimated import errors_told
 from irl_gym.intervals import as_interval
 from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
@@ -99,8 +99,6 @@ def _policies(report: Report) -> Table:
         table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
-    compared = told_by_episodes(report.metrics["policies"])
-    table.caption += f"\n{compared}" if compared else ""
     table.caption += _of_training(report)
     table.caption_justify = "left"
     return table

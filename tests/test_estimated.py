@@ -1,4 +1,4 @@
-"""What runs on tables that are estimates say of values and errors."""
+"""What runs on tables that are estimates say of their errors."""
 
 import json
 
@@ -8,34 +8,9 @@ from counted import counted, episode
 from windy_env import Windy
 
 from irl_gym.counting import Interaction
-from irl_gym.estimated import by_episodes, errors_told, evidence_told, told_by_episodes
+from irl_gym.estimated import errors_told, evidence_told
 
 pytestmark = pytest.mark.usefixtures("unchecked")
-
-
-def paid(*rewards):
-    return episode([0] * (len(rewards) + 1), [0] * len(rewards), rewards)
-
-
-def test_values_by_episodes_are_discounted_means_with_an_interval():
-    found = by_episodes([paid(0, 1), paid(0, 1), paid(1)], 0.5)
-    assert found["value"] == pytest.approx(2 / 3) and found["low"] < 2 / 3 < found["high"] and found["episodes"] == 3
-
-
-def test_an_interval_is_unknown_where_all_episodes_earned_the_same():
-    assert by_episodes([paid(1), paid(1)], 0.5)["low"] is None
-
-
-@pytest.mark.parametrize(("value", "outside"), [(0.5, False), (0.9, True)])
-def test_a_value_of_the_table_outside_what_episodes_say_is_told(value, outside):
-    found = {"value": 0.45, "low": 0.4, "high": 0.6, "episodes": 9}
-    told = told_by_episodes({"expert": {"value": value, "by_episodes": found}, "random": {"value": 0.1, "by_episodes": None}})
-    assert f"expert 0.450 (0.400 to 0.600), {value:.3f} by the table" in told and ("outside" in told) == outside
-    assert "random" not in told
-
-
-def test_nothing_is_told_of_episodes_where_the_table_is_exact():
-    assert told_by_episodes({"expert": {"value": 1.0, "by_episodes": None}, "random": {"value": 0.0}}) == ""
 
 
 def test_errors_are_told_in_numbers_and_words():

@@ -172,7 +172,6 @@ SAID = {
         "Counts of 4000 steps",
         "Probabilities within",
         "sampling noise",
-        "by the table",
         "Hidden state none seen",
         "fresh episodes",
     ),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.diagnoses.spoken import usable_flags, with_names
-from irl_gym.estimated import errors_told, told_by_episodes
+from irl_gym.estimated import errors_told
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, score_of, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -220,8 +220,6 @@ def table_facts(run: Run) -> Section:
         lines.append(("Where from", str(told.get("method", ""))))
     if told.get("hidden_state"):
         lines.append(("Hidden state", str(told["hidden_state"])))
-    if compared := told_by_episodes(run.metrics["policies"]):
-        lines.append(("Values by episodes", compared))
     if told.get("split"):
         lines.append(("Split", f"{counted(told['split'], 'state')} both ordinary and terminal"))
     check = told.get("check")

@@ -20,17 +20,18 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.checks import checked_number
-from irl_gym.copies.calls import called, stepped
+from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.demonstrations import Episode, stacked
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
 from irl_gym.listed_states import ListedStates
-from irl_gym.mdp import TabularMDP, check_discount
+from irl_gym.mdp import TabularMDP, check_discount, entry_rows
 from irl_gym.policies import Policy, generator
 from irl_gym.rewards import TabularReward
-from irl_gym.tabulation import Evidence, Tabulation
+from irl_gym.tabulation import Evidence, Samples, Tabulation
 from irl_gym.tally import tally
+from irl_gym.value_error import with_errors
 
 Unvisited = Literal["self-loop", "uniform", "refuse"]
 
@@ -120,11 +121,16 @@ class Counting:
         # Hoeffding's inequality for all first states at once, those that no episode began in too.
         start_error = min(1.0, float(np.sqrt(np.log(2 * n / 0.05) / (2 * seen.n_episodes))))
         evidence = Evidence(
-            method, exact=False, merged=0, split=len(copies), check=None, error=max(counts.largest_error(), start_error)
-        )
+            method, exact=False, merged=0, split=len(copies), check=None, error=max(counts.largest_error(), start_error),
+            repeats=seen.repeats,
+        )  # fmt: skip
         reward = TabularReward(payments.mean, {"source": "samples"})
-        table = Tabulation(TabularMDP(P, gamma, d0, visits), reward, payments, states, evidence)
-        return CountedTable(table, counts)
+        found = np.where(visits.ravel() > 0, visits.ravel(), 1)[entry_rows(P)]
+        frequencies = np.where(visits.ravel()[entry_rows(P)] > 0, successors.data / found, P.data)
+        paid = float(seen.paid[:, 2].min()), float(seen.paid[:, 3].max())
+        samples = Samples(visits.astype(np.float64), frequencies, float(seen.n_episodes), paid)
+        table = Tabulation(TabularMDP(P, gamma, d0, visits), reward, payments, states, evidence, samples)
+        return CountedTable(with_errors(table), counts)
 
     def _completed(
         self, entries: Entries, missing: np.ndarray, acting: np.ndarray, states: ListedStates, least: float
@@ -182,7 +188,8 @@ class Interaction:
         """
         space: Any = env.action_space
         episodes = interact(without_watchers(env), self.steps, seed=self.seed)
-        return self.counting.table(_told(episodes, self.steps, progress), env.observation_space, int(space.n), gamma=gamma)
+        with seeded_globals([self.seed]):
+            return self.counting.table(_told(episodes, self.steps, progress), env.observation_space, int(space.n), gamma=gamma)
 
 
 def _told(episodes: Iterable[Episode], steps: int, progress: Callable[[int, int], None] | None) -> Iterator[Episode]:

@@ -108,7 +108,8 @@ def discretize(
     evidence = Evidence(
         f"A grid of {' x '.join(map(str, cells.shape))} cells: of each, {METHODS[successors]} ({successors}; samples: "
         f"{samples}). The first states are those of {starts} resets.",
-        exact=False, merged=table.lines - mdp.P.nnz, split=copies, check=None, error=None,
+        exact=False, merged=table.lines - mdp.P.nnz, split=copies, check=None, error=None, reward_error=None,
+        value_error=None,
     )  # fmt: skip
     payments = Payments(mean, deviation, None, table.largest)
     return Tabulation(

@@ -16,6 +16,7 @@ from irl_gym.discounted import EPSILON
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import NotTabular, UndefinedDistance
+from irl_gym.estimated import evidence_told
 from irl_gym.howard import Optimum
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp import TabularMDP
@@ -221,10 +222,9 @@ def _table(world: TableWorld) -> dict[str, Any]:
     return {
         "horizon": world.horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
-        "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "error": evidence.error,
+        "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
         "counted": mdp.visits is not None,
-        "method": evidence.method,
-        "check": None if evidence.check is None else dict(vars(evidence.check)),
+        **evidence_told(evidence),
     }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.confirmation import loss_told
+from irl_gym.estimated import errors_told
 from irl_gym.intervals import as_interval
 from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
@@ -141,10 +142,12 @@ OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal 
 
 def _table(table: Mapping[str, Any]) -> str:
     """How big the table is, where it is from, and how far off it can be."""
-    off = table["error"]
-    told = table["exact"] or not off or "confidence" in table["method"]
-    sure = "" if told else f" Probabilities within {off:.2g}, with 95 % confidence."
-    return f"{table['reachable']:,} reachable states, {table['actions']} actions. {table['method']}{sure}"
+    errors = "; ".join(f"{name} {told}" for name, told in errors_told(table).items())
+    told = [table["method"], *([f"{errors[0].upper()}{errors[1:]}."] if errors else [])]
+    if not table["exact"]:
+        kept = (("Hidden state", "hidden_state"), ("Checked against the environment:", "checked"))
+        told += [f"{what} {table[key]}." for what, key in kept if table.get(key)]
+    return f"{table['reachable']:,} reachable states, {table['actions']} actions. {' '.join(told)}"
 
 
 def _how_valued(report: Report) -> str:

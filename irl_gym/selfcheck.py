@@ -17,6 +17,7 @@ from scipy.stats import chi2
 from irl_gym._typing import Matrix
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.errors import NotTabular, TableMismatch, UnknownObservation
+from irl_gym.intervals import mean_interval
 from irl_gym.mdp import TabularMDP, entry_positions
 from irl_gym.policies import generator
 from irl_gym.states import States
@@ -63,6 +64,23 @@ class SelfCheck:
     """Its degrees of freedom; 0 when every such row has one successor."""
     p_value: float
     """Probability of a statistic this large when the table is right."""
+    episodes: int = 0
+    """Fresh episodes that the steps were made in, where the table is an estimate; 0 where it is exact."""
+    new_steps: int = 0
+    """Steps that such a table has never seen: what follows, what is paid, or the pair (s, a) itself. Few samples miss some."""
+    new_episodes: int = 0
+    """Episodes with such a step."""
+
+    def __str__(self) -> str:
+        seen = f"{self.steps:,} steps, {self.rows_seen:,} of {self.rows_total:,} pairs (s, a)"
+        if not self.episodes:
+            return f"{seen}, no contradiction; p = {self.p_value:.2g}"
+        share = mean_interval(np.repeat([1.0, 0.0], [self.new_episodes, self.episodes - self.new_episodes]), possible=(0, 1))
+        return (
+            f"{seen}, in {self.episodes:,} fresh episodes: {self.new_steps:,} steps that the table has never seen, in "
+            f"{share.estimate:.1%} of episodes ({share.low:.1%} to {share.high:.1%}); the others as two samples of one: "
+            f"p = {self.p_value:.2g}"
+        )
 
 
 def compare_with_steps(
@@ -74,7 +92,7 @@ def compare_with_steps(
         NotTabular: the environment cannot be copied.
         TableMismatch: a step the table says is impossible, or frequencies that it makes all but impossible.
     """
-    walker = _copy_of(env)
+    walker = copy_of(env)
     rng = generator(seed)
     A = mdp.n_actions
     first_action = int(getattr(walker.action_space, "start", 0))
@@ -109,7 +127,12 @@ def _row_of(states: States, observation: Any, *, terminated: bool) -> int:
         raise TableMismatch(f"the environment showed what the table does not hold: {error} {OUTSIDE}") from error
 
 
-def _copy_of(env: gym.Env) -> gym.Env:
+def copy_of(env: gym.Env) -> gym.Env:
+    """A copy without watchers, or the environment made anew where it cannot be copied.
+
+    Raises:
+        NotTabular: neither can be done.
+    """
     try:
         return without_watchers(env)
     except NotTabular as error:

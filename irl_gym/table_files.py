@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import struct
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from gymnasium import spaces
 from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
+from irl_gym.repeats import Repeats
 from irl_gym.rewards import UNREADABLE, TabularReward, plain_json
 from irl_gym.selfcheck import Payments, SelfCheck
 from irl_gym.states import StateIndex
@@ -62,7 +64,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
         raise InvalidMDP(
             f"the states are {type(states).__name__}: expected a StateIndex or ListedStates. Make such a table again instead."
         )
-    evidence = {**vars(table.evidence), "check": None if table.evidence.check is None else vars(table.evidence.check)}
+    evidence = asdict(table.evidence)
     none = np.zeros(0)
     beside = path.with_name(f".{path.name}.tmp.npz")
     np.savez(
@@ -123,6 +125,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
     if states.n_states != mdp.n_states:
         raise InvalidMDP(f"the table has {mdp.n_states} states and a numbering of {states.n_states}: expected as many.")
     evidence = json.loads(str(found["evidence"]))
-    check = None if evidence["check"] is None else SelfCheck(**evidence["check"])
+    for name, kind in (("check", SelfCheck), ("repeats", Repeats)):
+        evidence[name] = None if evidence.get(name) is None else kind(**evidence[name])
     reward = TabularReward(found["reward"], {"source": "environment"})
-    return Tabulation(mdp, reward, payments, states, Evidence(**{**evidence, "check": check}))
+    return Tabulation(mdp, reward, payments, states, Evidence(**evidence))

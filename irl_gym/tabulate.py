@@ -3,7 +3,8 @@
 `tabulate(env, gamma=...)` asks each source in `SOURCES` in turn: an environment that is a table (TabularEnv), the table that an
 environment publishes, rules that are known (Blackjack), a model that the environment offers (gym-classics). Where none answers,
 copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out: truncation is not
-part of an MDP. Then `env.step` is sampled and compared with the table.
+part of an MDP. Then `env.step` is sampled and compared with the table: an exact one step by step, one that is an estimate by
+fresh episodes, as a second sample.
 """
 
 import difflib
@@ -19,15 +20,17 @@ from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.blackjack import blackjack_table
 from irl_gym.checks import checked_number
+from irl_gym.copies.calls import seeded_globals
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
+from irl_gym.fresh_episodes import compare_with_episodes
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.published_model import model_table
 from irl_gym.published_table import published_table
 from irl_gym.reveal import layers
 from irl_gym.rewards import TabularReward
-from irl_gym.selfcheck import compare_with_steps
+from irl_gym.selfcheck import SelfCheck, compare_with_steps
 from irl_gym.states import StateIndex
 from irl_gym.tabular_env import TabularEnv
 from irl_gym.tabulation import Evidence, Tabulation, payments_of
@@ -70,7 +73,7 @@ def tabulate(
         by: how. None is `Enumeration(known=True)`: what is known of the environment, and enumeration where nothing is.
             `irl_gym.enumeration.table.Enumeration(...)` has limits and can be continued; `irl_gym.counting.Interaction(...)`
             counts what random steps do.
-        check_steps: steps of a copy of the environment to compare with an exact table; 0 for none.
+        check_steps: steps of a copy of the environment to compare with the table; 0 for none.
         seed: of the check.
         progress: called with two numbers as an enumeration goes on: states tried and found.
 
@@ -81,7 +84,7 @@ def tabulate(
         HiddenState: one observation behaves in two ways.
         EnumerationLimit: more states than allowed.
         UnknownObservation, InvalidReward: the environment left its own observation space, or paid NaN.
-        TableMismatch: `env.step` did what the table says is impossible.
+        TableMismatch: `env.step` did what the table says is impossible, or does other things than it did when it was counted.
     """
     check_discount(gamma)
     if not isinstance(env, gym.Env):
@@ -101,10 +104,17 @@ def tabulate(
     by = by or Enumeration(known=True)
     known = (source(env, gamma) for source in SOURCES) if isinstance(by, Enumeration) and by.known else ()
     found = next(filter(None, known), None) or by.table(env, gamma, progress)
-    if check_steps and found.evidence.exact:
-        check = compare_with_steps(env, found.mdp, found.states, found.payments, steps=int(check_steps), seed=int(seed))
-        found = replace(found, evidence=replace(found.evidence, check=check))
+    if check_steps:
+        found = replace(found, evidence=replace(found.evidence, check=_checked(env, found, int(check_steps), int(seed))))
     return found if learned is None else _with_reward(found, learned)
+
+
+def _checked(env: gym.Env, found: Tabulation, steps: int, seed: int) -> SelfCheck | None:
+    """What sampling the environment says of a table; None where there is nothing to compare with."""
+    with seeded_globals([seed]):
+        if found.evidence.exact:
+            return compare_with_steps(env, found.mdp, found.states, found.payments, steps=steps, seed=seed)
+        return None if found.samples is None else compare_with_episodes(env, found, found.samples, steps=steps, seed=seed)
 
 
 def make(env_id: str, **kwargs: Any) -> gym.Env:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym._typing import Sparse
+from irl_gym._typing import Matrix, Sparse
 from irl_gym.mdp import TabularMDP, TransitionTable, entry_positions, entry_rows
+from irl_gym.repeats import Repeats
 from irl_gym.rewards import RewardFunction, TabularReward
 from irl_gym.selfcheck import Payments, SelfCheck
 from irl_gym.states import States
@@ -32,18 +33,53 @@ class Evidence:
     check: SelfCheck | None
     """What sampling `env.step` found; None when it was not asked for."""
     error: float | None = 0.0
-    """All probabilities of P are within this of the environment's, with 95 % confidence, and so are those of d0; 0 where
-    exact, None where not known."""
+    """Sampling noise: if observations hide no state, all probabilities of P and d0 are within this of the environment's, with
+    95 % confidence; 0 where exact, None where not known, as where hidden state was found."""
+    reward_error: float | None = 0.0
+    """The same of the mean rewards, if no step pays less or more than was seen; None too where all paid the same."""
+    value_error: float | None = 0.0
+    """The same of discounted values from the first states: the best one, and that of any policy."""
+    repeats: Repeats | None = None
+    """What repeated visits within an episode say about hidden state; None where the table was not counted from episodes."""
 
     def __str__(self) -> str:
         """The evidence in a few lines a person reads."""
-        off = "by an amount that is not known" if self.error is None else f"by {self.error:.2g} at most, with 95 % confidence"
-        lines = [self.method, "exact                    yes" if self.exact else f"exact                    no, off {off}"]
+        lines = [self.method, f"exact                    {'yes' if self.exact else 'no'}"]
+        if not self.exact:
+            lines += [f"{name:24} {told}" for name, told in self.errors().items()]
+        if self.repeats is not None:
+            lines.append(f"hidden state             {self.repeats}")
         lines.append(f"ends that are states too {self.split}")
         if self.check is not None:
-            seen = f"{self.check.steps:,} steps, {self.check.rows_seen:,} of {self.check.rows_total:,} pairs (s, a)"
-            lines.append(f"checked against env.step {seen}, no contradiction; p = {self.check.p_value:.2g}")
+            lines.append(f"checked against env.step {self.check}")
         return "\n".join(lines)
+
+    def errors(self) -> dict[str, str]:
+        """What is off, and by how much at most, in words."""
+        if self.repeats is not None and self.repeats.hidden:
+            return {"sampling noise": "not bounded, since observations hide state: show it with `irl_gym.reveal.Reveal`"}
+        if self.error is None:
+            return {"probabilities": "off by an amount that is not known"}
+        sure = f"within {self.error:.2g} for sampling noise, with 95 % confidence, if observations hide no state"
+        told = {"probabilities": sure}
+        for name, off in (("mean rewards", self.reward_error), ("values planned on it", self.value_error)):
+            if off is not None:
+                told[name] = f"within {off:.2g}, likewise"
+        return told
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The samples behind a table that is not exact."""
+
+    visits: Matrix
+    """(S, A) samples of each row; infinite where it was enumerated, 0 where a rule made it up."""
+    frequencies: np.ndarray
+    """(nnz,) the share of them that each entry of P had, in the order of P.data; P itself where there is no prior."""
+    starts: float
+    """Episodes behind d0; infinite where it was enumerated."""
+    rewards: tuple[float, float]
+    """The least and the largest reward seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +96,8 @@ class Tabulation:
     """Observations to rows and back."""
     evidence: Evidence
     """How it was obtained."""
+    samples: Samples | None = None
+    """What it was estimated from; None where it is exact, of cells, or read from a file."""
 
 
 def payments_of(table: TransitionTable, reward: RewardFunction) -> Payments:

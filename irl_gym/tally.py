@@ -6,7 +6,7 @@ Axes: S states, A actions, M different transitions, n observations of k numbers.
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gymnasium import spaces
@@ -15,6 +15,7 @@ from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, UnknownObservation
 from irl_gym.integer_spaces import checked_members, ranges, to_numbers
 from irl_gym.listed_states import in_order
+from irl_gym.repeats import Repeats, Visits
 
 BLOCK = 10_000
 """Steps read at a time; fewer where an observation has many numbers."""
@@ -48,6 +49,8 @@ class Tally:
     """(M, 4) float64: sum, sum of squares, least and largest reward."""
     n_episodes: int
     """Episodes read."""
+    repeats: Repeats
+    """What repeated visits within an episode say about hidden state."""
 
 
 def tally(episodes: Iterable[Episode], space: spaces.Space, n_actions: int) -> Tally:
@@ -89,6 +92,7 @@ class _Found:
         self.ordinary: set[int] = set()
         self.ended: set[int] = set()
         self.lines: dict[tuple[int, int], list[float]] = {}
+        self.visits = Visits()
 
     def add(self, block: list[Episode]) -> None:
         """Count some episodes."""
@@ -105,6 +109,7 @@ class _Found:
         pairs = np.delete(ids, lasts) * self.n_actions + actions
         arrivals = np.delete(ids * 2 + done, firsts)
         self._add_lines(pairs, arrivals, rewards)
+        self.visits.add(pairs, arrivals, rewards, self.n_episodes + np.repeat(np.arange(len(block)), lengths))
         self.n_episodes += len(block)
 
     def _numbers(self, block: list[Episode]) -> np.ndarray:
@@ -180,7 +185,10 @@ class _Found:
         keys, sums = np.array(list(self.lines), dtype=np.int64), np.array(list(self.lines.values()))
         s, a = np.divmod(keys[:, 0], self.n_actions)
         arrived, terminated = np.divmod(keys[:, 1], 2)
+        repeats = self.visits.result()
+        at, action = divmod(repeats.row, self.n_actions)
         return Tally(
             numbers[order], started[order], ordinary[order], ended[order], rank[s] * self.n_actions + a, rank[arrived],
             terminated == 1, sums[:, 0].astype(np.int64), sums[:, 1:], self.n_episodes,
+            replace(repeats, row=int(rank[at]) * self.n_actions + action),
         )  # fmt: skip

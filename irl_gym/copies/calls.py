@@ -5,10 +5,13 @@ message and stays its cause, so that its own traceback is shown too. What passes
 cannot be enumerated is one), and a lack of memory, which is no fault of the environment's.
 """
 
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import gymnasium as gym
+import numpy as np
 
 from irl_gym.errors import IrlGymError, NotTabular
 
@@ -44,3 +47,17 @@ def stepped(env: gym.Env, action: Any) -> tuple[Any, float, bool, bool]:
 def _step(env: gym.Env, action: Any) -> tuple[Any, float, bool, bool]:
     observation, reward, terminated, truncated, _ = env.step(action)
     return observation, float(reward), bool(terminated), bool(truncated)
+
+
+@contextmanager
+def seeded_globals(seed: list[int]) -> Iterator[None]:
+    """Seed the generators that NumPy and Python share, for a while: some environments draw from them."""
+    number = int(np.random.SeedSequence(seed).generate_state(1)[0])
+    legacy, plain = np.random.get_state(), random.getstate()  # noqa: NPY002 (theirs, not ours)
+    np.random.seed(number)  # noqa: NPY002
+    random.seed(number)
+    try:
+        yield
+    finally:
+        np.random.set_state(legacy)  # noqa: NPY002
+        random.setstate(plain)

@@ -3,7 +3,8 @@
 The search compares an observation in a few inner states, and all of these lie near the start. An environment that counts its
 steps to 50 and then ends is not found out by that: so walks of many steps are made, and each step is compared with the lines of
 the table. Every other walk avoids what can end it, as far as the table knows. A step that is not in the table leads to the
-proof: the state is tried in the inner state of that moment.
+proof: the state is tried in the inner state of that moment. Where resets are counted, what they draw has no list, and a number
+that is drawn there may decide all that follows: then many walks are made, each from a reset of its own.
 """
 
 import math
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from irl_gym.copies.snapshots import ConstantChanged
-from irl_gym.enumeration.trials import OutsideRandomness
+from irl_gym.enumeration.outside import OutsideRandomness
 
 if TYPE_CHECKING:
     from irl_gym.enumeration.explorer import Explorer
@@ -29,6 +30,8 @@ SHARE = 0.1
 """Walks take no more than so many seconds, or this share of the time that the search took, whichever is more."""
 WALKS = 500
 """Walks at most, where they are short."""
+RESETS, SHORT = 100, 200
+"""Walks at least where resets are counted, whatever they take, and steps of one of them after STEPS."""
 
 
 @dataclass(frozen=True)
@@ -57,26 +60,30 @@ def walk_on(explorer: "Explorer", seconds: float) -> None:
     """
     latest = time.monotonic() + max(SECONDS, SHARE * seconds)
     left, trials = STEPS, explorer.trials
+    least = RESETS if explorer.explored.starts_counted else 0
     for walk in range(WALKS):
         seed = [explorer.limits.seed, walk, len(explorer.explored.keys)]
 
-        def run(seed: list[int] = seed, most: int = min(left, LONGEST)) -> tuple[int, Step | None]:
+        most = min(left, LONGEST) if left > 0 and time.monotonic() < latest else SHORT
+
+        def run(seed: list[int] = seed, most: int = most) -> tuple[int, Step | None]:
             steps = 0
             for step in _steps(explorer, seed, None):
                 steps += 1
                 if not step.possible:
                     return steps, step
-                if steps >= most or time.monotonic() > latest:
+                if steps >= most or (steps >= SHORT and time.monotonic() > latest):
                     break
             return steps, None
 
         truncated = trials.truncated
-        steps, contradiction = trials.seeded(seed, run)
+        steps, contradiction = trials.walked(seed, run)
         explorer.explored.counted["truncated"] += trials.truncated - truncated
         if contradiction is not None:
             _prove(explorer, seed, contradiction)
         left -= max(steps, 1)
-        if left <= 0 or time.monotonic() > latest:
+        explorer.explored.resets = walk + 1 if least else 0
+        if walk + 1 >= least and (left <= 0 or time.monotonic() > latest):
             return
 
 
@@ -95,7 +102,7 @@ def _steps(explorer: "Explorer", seed: list[int], keep: int | None) -> Iterator[
         key = explorer.key(observation)
         known = explored.ends.get(key) if ended else explored.ids.get(key)
         successor = None if known is None else -1 - known if ended else known
-        sure = number >= explorer.known_from and number * explorer.n_actions + action not in explorer.counted_rows
+        sure = number * explorer.n_actions + action not in explored.sampled
         possible = not sure or any(_is(line, action, successor, reward) for line in lines)
         yield Step(number, list(way) if not possible else way, possible, inner)
         way.append(action)

@@ -57,6 +57,12 @@ class Explored:
         """How often what happened, by the names of COUNTED."""
         self.always: tuple[str, ...] = ()
         """Attributes that belong to the inner state however large they are."""
+        self.outside = ""
+        """What it draws from that is not its own, so that all is counted; empty for nothing."""
+        self.sampled: set[int] = set()
+        """Pairs, number of the state * A + action, whose lines are counts."""
+        self.resets = 0
+        """Resets whose walks were compared with the table, where resets are counted."""
         self.keys: list[Hashable] = []
         self._whole = (0, 0, 0, dict(self.counted))
 
@@ -64,6 +70,11 @@ class Explored:
     def n_expanded(self) -> int:
         """States whose actions have been tried."""
         return len(self.first_line) - 1
+
+    @property
+    def starts_counted(self) -> bool:
+        """Was the reset counted, since its draws cannot be listed?"""
+        return any(self.scripts[number][:1] == (-1,) for number in self.starts)
 
     def add(self, key: Hashable, parent: int, action: int, script: Script) -> int:
         """Number a new state; the parent of a start is -1."""
@@ -126,7 +137,8 @@ class Explored:
         np.savez(
             beside,
             identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(counted)),
-            always=np.array(json.dumps(self.always)),
+            sampled=np.array(sorted(row for row in self.sampled if row < expanded * self.n_actions), dtype=np.int64),
+            always=np.array(json.dumps(self.always)), outside=np.array(self.outside), resets=np.array(self.resets),
             states=numbers_of_keys(space, self.keys[:n]), ends=ends,
             parents=np.array(self.parents[:n]), actions=np.array(self.actions[:n]),
             script_lengths=np.array([len(script) for script in scripts], dtype=np.int64),
@@ -190,5 +202,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) 
     explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
     explored.counted |= dict(json.loads(str(found["counted"])))
     explored.always = tuple(json.loads(str(found["always"])))
+    explored.sampled = set(found["sampled"].tolist())
+    explored.outside, explored.resets = str(found["outside"]), int(found["resets"])
     explored.settle()
     return explored

@@ -19,7 +19,7 @@ from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proo
 from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.replays import Replays
-from irl_gym.enumeration.trials import Outcomes, Trials, shared_mark
+from irl_gym.enumeration.trials import Call, Outcomes, Trials
 from irl_gym.errors import HiddenState, IrlGymError, NotTabular, UnknownObservation
 from irl_gym.integer_spaces import as_batch, checked_members, key_of, to_numbers
 
@@ -61,10 +61,6 @@ class Explorer:
         self._doubts: deque[tuple[int, Any, Way]] = deque()
         self._held = 0
         self.explored = explored or Explored(self.n_actions)
-        self.counted_rows: set[int] = set()
-        """Pairs (s, a) whose lines are counts, as far as this search knows; an earlier one did not keep them."""
-        self.known_from = 0 if explored is None or not explored.counted["rows"] else explored.n_expanded
-        """The first state of which that is known."""
         self.replays = Replays(self.explored, self.trials, self.space, self.key)
         self._continued = explored is not None
         self._on_states, self._began = on_states, time.monotonic()
@@ -82,30 +78,28 @@ class Explorer:
             EnumerationLimit: more states, bytes or seconds than allowed.
             HiddenState: one observation behaves in two ways.
             NotTabular: the environment raised an error.
+            OutsideRandomness: it draws from generators that are not its own.
         """
-        explored, shared = self.explored, shared_mark()
+        explored = self.explored
+        self.trials.look(self.trials.reset())
         while explored.n_expanded < len(explored.keys):
             number = explored.n_expanded
             state = self._waiting.pop(number)
             self._held -= _size(state)
             explored.expand(number, [line for action in range(self.n_actions) for line in self._row(number, state, action)])
-            before, shared = shared, shared_mark()
-            if shared != before:
-                self._suspect(state)
+            self.trials.look(*self._steps(state))
             self._doubts.extend(self._newcomers.pop(number, ()))
             while self._doubts:
                 self._compare(*self._doubts.popleft())
             self._check_limits(time.monotonic() - self._began)
             yield
         more = self._continued or any(times >= self.limits.revisits for times in self._revisits.values())
+        more = more or explored.starts_counted
         if more and self.limits.revisits and not self.trials.counting:
             walk_on(self, time.monotonic() - self._began)
 
-    def _suspect(self, *states: Any) -> None:
-        """Is it the shared generators that decide what these inner states do?"""
-        for state in states:
-            for action in range(self.n_actions):
-                self.trials.suspect(self.trials.step(state, action))
+    def _steps(self, state: Any) -> list[Call]:
+        return [self.trials.step(state, action) for action in range(self.n_actions)]
 
     def _begin(self) -> None:
         seen = self.trials.outcomes(self.trials.reset(), -1, self._keep, runs=self.limits.start_runs)
@@ -129,7 +123,7 @@ class Explorer:
         seen = self.trials.outcomes(self.trials.step(state, action), row, self._keep, runs=self.limits.runs)
         self._count(seen)
         if seen.runs:
-            self.counted_rows.add(row)
+            self.explored.sampled.add(row)
         self.explored.counted["truncated"] += self.trials.truncated > truncated
         for one in seen.all:
             (_, reward, terminated), (key, reached) = one.result, one.made
@@ -221,7 +215,7 @@ class Explorer:
         action = unlike(first, second)
         if action is not None:
             found = self.replays.state(number)
-            self._suspect(found, newcomer)
+            self.trials.look(*self._steps(found), *self._steps(newcomer))
             differ = self.trials.snapshots.differences(found, newcomer)
             raise HiddenState(proof(self.explored, self.space, number, action, first, second, way(), differ))
         return True

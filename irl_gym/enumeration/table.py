@@ -25,14 +25,17 @@ from irl_gym.copies.stripped import without_watchers
 from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
-from irl_gym.enumeration.trials import OutsideRandomness
+from irl_gym.enumeration.outside import OutsideRandomness
 from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.mdp import TabularMDP
 from irl_gym.reveal import known_hidden
-from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
+from irl_gym.tabulation import Evidence, Lines, Samples, Tabulation, from_lines
+from irl_gym.value_error import with_errors
 
+AS_GOOD_AS_EXACT = 10**9
+"""Visits that an enumerated row counts for, in a table of which other rows were counted."""
 OnStates = Callable[[int, int], None]
 """Called with the number of states tried and found, as the search goes on."""
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
@@ -83,12 +86,12 @@ class Enumeration(Limits):
         """
         ranges(env.observation_space)  # refuses floats before anything is copied
         explored = self._explore(env, progress or (lambda tried, found: None))
-        return _assembled(explored, env, gamma, looked=self.revisits > 0)
+        return _assembled(explored, env, gamma, self)
 
     def _explore(self, env: gym.Env, on_states: OnStates) -> Explored:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
         always: frozenset[str] = frozenset()
-        counting = False
+        outside = ""
         if self.checkpoint is not None and not Path(self.checkpoint).absolute().parent.is_dir():
             raise InvalidParameter(f"checkpoint is {str(self.checkpoint)!r}: expected a file in a folder that exists. Make it.")
         while True:
@@ -96,13 +99,13 @@ class Enumeration(Limits):
             if self.checkpoint is not None and Path(self.checkpoint).exists():
                 space: Any = env.action_space
                 explored = load_explored(Path(self.checkpoint), env.observation_space, int(space.n), self._identity(env))
-                counting = counting or bool(explored.counted.get("outside"))
+                outside = outside or explored.outside
                 always |= frozenset(explored.always)
             try:
                 own = without_watchers(env)
                 called(lambda own=own: own.reset(seed=self.seed))
-                explorer = Explorer(own, self, explored, always, counting, on_states)
-                explorer.explored.counted["outside"] = int(counting)
+                explorer = Explorer(own, self, explored, always, bool(outside), on_states)
+                explorer.explored.outside = outside
                 explorer.explored.always = tuple(sorted(always))
                 explorer.explored.settle()
                 self._run(explorer, env, on_states)
@@ -110,8 +113,8 @@ class Enumeration(Limits):
             except ConstantChanged as error:
                 always |= frozenset({error.name})
                 self._forget()
-            except OutsideRandomness:
-                counting = True
+            except OutsideRandomness as error:
+                outside = error.what
                 self._forget()
             except HiddenState as error:
                 raise HiddenState(f"{error} {_mend(env)}") from None
@@ -185,7 +188,7 @@ def _mend(env: gym.Env) -> str:
     )
 
 
-def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) -> Tabulation:
+def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -> Tabulation:
     """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
     space = env.observation_space
     only_ends = [key for key in explored.ends if key not in explored.ids]
@@ -210,18 +213,29 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, *, looked: bool) 
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    found = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=_evidence(explored, len(copies), looked))
-    if explored.counted["rows"] <= 1:  # none, or first states alone
-        return found
-    mdp = found.mdp  # which rows were counted is not kept: all are taken to be, and from the fewest runs
-    visits = np.where(mdp.terminal[:, None], 0, np.full((mdp.n_states, A), explored.counted["fewest"]))
-    return replace(found, mdp=TabularMDP(mdp.P, gamma, mdp.d0, visits))
+    evidence = _evidence(explored, len(copies), limits.revisits > 0)
+    made = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=evidence)
+    if evidence.exact:
+        return made
+    visits = np.full(states.n_states * A, np.inf)
+    sampled = np.array(sorted(explored.sampled), dtype=np.int64)
+    visits[place[sampled // A] * A + sampled % A] = limits.runs
+    visits = visits.reshape(states.n_states, A)
+    if sampled.size:
+        counted = np.where(made.mdp.terminal[:, None], 0, np.minimum(visits, AS_GOOD_AS_EXACT)).astype(np.int64)
+        made = replace(made, mdp=TabularMDP(made.mdp.P, gamma, made.mdp.d0, counted))
+    starts = limits.start_runs if explored.starts_counted else math.inf
+    paid = min(explored.rewards), max(explored.rewards)
+    samples = Samples(visits, made.mdp.P.data, starts, paid)
+    return with_errors(replace(made, samples=samples))
 
 
 def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
     """How the table was obtained, in words that are the same where the search was interrupted and continued."""
     counted = explored.counted["rows"]
     method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
+    if explored.outside:
+        method = f"The environment draws from {explored.outside}, which is not its own. {method}"
     if not counted:
         method += f", with every outcome of its draws.{'' if looked else ' Hidden state was not looked for.'}"
         method += _left_out(explored)
@@ -231,12 +245,25 @@ def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
     error = math.sqrt(math.log(2 * explored.counted["lines"] / 0.05) / (2 * explored.counted["fewest"]))
     method += (
         f"; {counted:,} step(s) or reset(s) whose draws cannot be enumerated were run {mean_runs:,.0f} times each and counted: "
-        f"probabilities within {error:.3f}, all at once, with 95 % confidence."
+        f"sampling leaves probabilities within {error:.3f}, all at once, with 95 % confidence, if observations hide no state."
     )
-    if explored.counted["uncompared"]:
-        method += " Hidden state was not looked for in counted steps."
+    method += _looked_for(explored, looked)
     method += _left_out(explored)
     return Evidence(method, exact=False, merged=0, split=split, check=None, error=error)
+
+
+def _looked_for(explored: Explored, looked: bool) -> str:
+    """How far hidden state was searched for, where something was counted."""
+    if not looked:
+        return " Hidden state was not looked for."
+    told = " Hidden state was not looked for in counted steps." if explored.counted["uncompared"] else ""
+    if explored.resets:
+        rare = 1 - 0.05 ** (1 / explored.resets)
+        told += (
+            f" Of {explored.resets} further resets none led a random walk to a step that the table does not have: fewer than "
+            f"{rare:.1%} do, with 95 % confidence."
+        )
+    return told
 
 
 def _left_out(explored: Explored) -> str:

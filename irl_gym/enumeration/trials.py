@@ -4,36 +4,29 @@ Draws are enumerated where they can be, and probabilities are exact; else the ca
 own, and counted. Both are the same again whenever they are made again, by their *script*.
 """
 
-import random
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from ctypes import string_at
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.calls import called, stepped
+from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.draws import Draws
 from irl_gym.enumeration.explored import Script
 from irl_gym.enumeration.limits import Limits
+from irl_gym.enumeration.outside import OutsideRandomness, Watch
 from irl_gym.errors import NotEnumerable
 
 REPLAYED = 50
 """Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
-SUSPECTED = 25
-"""Times that it is made again where the generators that NumPy and Python share were drawn from, be it by the environment."""
-SUSPECTS = 500
-"""So many outcomes of calls in which the shared generators moved are all made again so often; of later ones, each fiftieth."""
 PULSE = 256
 """Runs of a call between two looks at the clock."""
 MOST_REFUSALS = 5
 """Calls whose outcomes were too many to enumerate, after which all random calls are counted."""
 ROUNDING = 1e-12
-WORDS = 4 * 625
-"""Bytes of a Mersenne Twister: its words, and the place among them."""
 
 Result = tuple[Any, float, bool]
 """Observation, reward, terminated."""
@@ -60,10 +53,6 @@ class Outcomes:
     """Runs that were counted; 0 where the outcomes were enumerated."""
 
 
-class OutsideRandomness(Exception):
-    """Internal: the same draws gave another outcome, so something else is random."""
-
-
 class Trials:
     """Calls of one environment.
 
@@ -88,7 +77,7 @@ class Trials:
         """Steps so far that the environment itself truncated."""
         self.pulse: Callable[[], None] = lambda: None
         """Called now and then while a call is run many times; it may raise."""
-        self._calls = self._suspects = 0
+        self._calls, self._watch = 0, Watch(env)
 
     def reset(self) -> Call:
         """A reset, as a call."""
@@ -125,12 +114,11 @@ class Trials:
         self._calls += 1
         if not self.counting:
             checked = self._calls <= 2 * REPLAYED or self._calls % REPLAYED == 0
-            before = shared_generators() if checked else None
             try:
                 found = self._enumerated(call, make)
                 if found is not None:
                     if checked:
-                        self._check(found[-1], call, SUSPECTED if shared_generators() != before else 1)
+                        self._check(found[-1], call)
                     return Outcomes(found, 0)
             except NotEnumerable:
                 self.refusals += 1
@@ -142,25 +130,18 @@ class Trials:
             found.append(Outcome(1 / runs, (-1, i), result, make(result)))
         return Outcomes(found, runs)
 
-    def suspect(self, call: Call) -> None:
-        """Make each outcome of a call again, many times where it moves the generators that NumPy and Python share.
+    def look(self, *calls: Call) -> None:
+        """Have the calls made since the last look drawn from outside the environment? Where all is counted they may.
 
         Raises:
-            OutsideRandomness: the same draws did not give the same.
+            OutsideRandomness: they have.
         """
-        if self.counting:
-            return
-        try:
-            found = self._enumerated(call, lambda _: None) or []
-        except NotEnumerable:
-            return  # it is counted
-        for one in found:
-            before = shared_generators()
-            self._check(one, call, 1)
-            if shared_generators() != before:
-                self._suspects += 1
-                if self._suspects <= SUSPECTS or self._suspects % REPLAYED == 0:
-                    self._check(one, call, SUSPECTED)
+        if not self.counting:
+            self._watch.look(lambda: [self._made_again(call) for call in calls])
+
+    def _made_again(self, call: Call) -> None:
+        with suppress(NotEnumerable):  # it is counted
+            self._enumerated(call, lambda _: None)
 
     def again(self, call: Call, row: int, script: Script) -> Result:
         """The outcome of a script."""
@@ -173,8 +154,21 @@ class Trials:
 
     def seeded(self, seed: list[int], run: Callable[[], T]) -> T:
         """Run with real random numbers, also of the generators that NumPy and Python share."""
-        with _seeded_globals(seed):
+        with seeded_globals(seed):
             return self.draws.seeded(seed, run)
+
+    def walked(self, seed: list[int], run: Callable[[], T]) -> T:
+        """The same, and looked at.
+
+        Raises:
+            OutsideRandomness: it drew from generators that are not the environment's own.
+        """
+        with seeded_globals(seed):
+            self._watch.begin()
+            result = self.draws.seeded(seed, run)
+            self._watch.look(lambda: self.draws.seeded(seed, run))
+        self._watch.begin()
+        return result
 
     def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
         """All outcomes; None for a random call after others had too many."""
@@ -187,12 +181,12 @@ class Trials:
                 return None
         return found
 
-    def _check(self, last: Outcome, call: Call, times: int) -> None:
+    def _check(self, last: Outcome, call: Call) -> None:
         before, paid, ended = last.result
-        for _ in range(times):
-            observation, reward, terminated = self.again(call, 0, last.script)
-            if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
-                raise OutsideRandomness
+        observation, reward, terminated = self.again(call, 0, last.script)
+        if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:
+            self.look(call)  # which knows its name
+            raise OutsideRandomness
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -202,36 +196,3 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(_same, a, b))
     return np.array_equal(np.asarray(a), np.asarray(b))
-
-
-def shared_mark() -> tuple[Any, ...]:
-    """What a draw from the generators that NumPy and Python share changes, read fast: once for each state of a search.
-
-    The second of two normal numbers of `np.random.randn` comes from a store and changes nothing here.
-    """
-    _, plain, stored = random.getstate()
-    module: Any = np.random  # whose stubs lack it
-    shared = module.get_bit_generator()
-    if type(shared) is np.random.MT19937:
-        return plain[0], plain[-1], stored, string_at(shared.ctypes.state_address, WORDS)
-    return plain[0], plain[-1], stored, repr(shared.state)
-
-
-def shared_generators() -> tuple[Any, ...]:
-    """The state of the generators that NumPy and Python share."""
-    name, keys, *rest = np.random.get_state()  # noqa: NPY002 (theirs, not ours)
-    return random.getstate(), name, np.asarray(keys).tobytes(), *rest
-
-
-@contextmanager
-def _seeded_globals(seed: list[int]) -> Iterator[None]:
-    """Seed the generators that NumPy and Python share, for a while: some environments draw from them."""
-    number = int(np.random.SeedSequence(seed).generate_state(1)[0])
-    legacy, plain = np.random.get_state(), random.getstate()  # noqa: NPY002 (theirs, not ours)
-    np.random.seed(number)  # noqa: NPY002
-    random.seed(number)
-    try:
-        yield
-    finally:
-        np.random.set_state(legacy)  # noqa: NPY002
-        random.setstate(plain)

@@ -8,6 +8,7 @@ import numpy as np
 
 from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
+from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import told_record
 from irl_gym.page.sections import Section
@@ -272,14 +273,17 @@ def table_facts(run: Run) -> Section:
         ("Transitions", f"{told['transitions']:,}"),
     ]
     if "exact" in told:
-        off = told.get("error")
-        sure = "not exact" if off is None else f"within {number(off, 2)}, with 95 % confidence"
-        lines.append(("Probabilities", "exact" if told["exact"] else sure))
+        off = errors_told(told) or {"probabilities": "exact"}
+        lines += [(name.capitalize(), words) for name, words in off.items()]
         lines.append(("Where from", str(told.get("method", ""))))
+    if told.get("hidden_state"):
+        lines.append(("Hidden state", str(told["hidden_state"])))
     if told.get("split"):
         lines.append(("Split", f"{counted(told['split'], 'state')} both ordinary and terminal"))
     check = told.get("check")
-    if check:
+    if check and check.get("episodes"):
+        lines.append(("Checked", str(told["checked"])))
+    elif check:
         lines.append(
             ("Checked", f"{check['steps']:,} steps of the environment, no contradiction; p = {number(check['p_value'], 2)}")
         )

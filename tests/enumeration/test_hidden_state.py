@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from enumeration_envs import Corridor
 from gymnasium import spaces
+from windy_env import Calm, Windy
 
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.table import Enumeration
@@ -203,3 +204,26 @@ def test_a_long_way_is_told_by_its_end():
             super().__init__(61)
 
     assert "actions that end with [1" in told(Long())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_number_that_is_drawn_at_reset_and_read_later_is_found(seed):
+    with pytest.raises(HiddenState, match=r"observation 3 hides part of .*wind: .*Reveal"):
+        table_of(Windy(), start_runs=300, seed=seed)
+
+
+class Rare(Windy):
+    """Reset draws a number that decides nothing."""
+
+    def step(self, action):
+        self.wind = min(self.wind, 0.0)
+        return super().step(action)
+
+
+def test_how_rare_a_number_drawn_at_reset_can_be_is_told_where_none_is_found():
+    method = table_of(Rare(), start_runs=300).evidence.method
+    assert "Of 100 further resets none led a random walk to a step that the table does not have: fewer than 3.0% do" in method
+
+
+def test_a_number_that_is_drawn_anew_at_every_step_is_no_hidden_state():
+    assert table_of(Calm(), runs=100, start_runs=100).mdp.n_states == 8

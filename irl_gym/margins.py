@@ -94,4 +94,5 @@ def _margins(
     at, reward = (comparisons.states, comparisons.actions), found.table.reward
     left = reward.tolerance if tolerance is None else tolerance
     worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
-    return Margins(values[at], unsure[at], found.level[at] + left, worth)
+    moved = ~(comparisons.trivial & reward.on_states)  # the others are 0 whatever the reward
+    return Margins(values[at] * moved, unsure[at] * moved, found.level[at] + left, worth)

@@ -198,7 +198,7 @@ def test_tie_aware_agreement_counts_ties_broken_otherwise():
 def test_tie_aware_agreement_is_zero_for_the_opposite_reward():
     opposite = np.array([0.0, -1.0, 1.0])
     assert tie_aware_agreement(two_ways(), opposite, ZEROS) == Agreement(0.0, 0.0)
-    assert tie_aware_agreement(two_ways(), -opposite, ZEROS) == 1.0
+    assert tie_aware_agreement(two_ways(), -opposite, ZEROS) == Agreement(1.0, 0.0)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e9])

@@ -8,10 +8,10 @@ from counted import counted, episode
 from scipy.stats import poisson
 
 from irl_gym.comparisons import compare
-from irl_gym.dynamic_programming import Discounted
 from irl_gym.errors import InvalidMDP
 from irl_gym.learners.feature_certificate import judge_table
 from irl_gym.mdp import TabularMDP
+from irl_gym.rewards import TabularReward
 
 SHAPES = {
     "two, even": [0.5, 0.5],
@@ -147,5 +147,5 @@ def test_visits_that_are_no_counts_are_refused(visits):
 
 def test_feature_rewards_have_no_margin_within_noise():
     mdp, policy, R = table(two([520, 480], [480, 520])), np.zeros(60, dtype=int), np.linspace(-1, 1, 60)
-    found = judge_table(mdp, policy, np.ones(60, dtype=bool), R, Discounted(mdp.P_pi(policy), mdp.gamma))
+    found = judge_table(mdp, policy, np.ones(60, dtype=bool), TabularReward(R), np.zeros((0, 2), dtype=np.int64))
     assert found.margin[0] == 0

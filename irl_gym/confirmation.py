@@ -52,11 +52,11 @@ def loss_by_episodes(table: Tabulation, episodes: Sequence[Episode]) -> Interval
     returns, left = _discounted(table, episodes)
     first = np.array([int(episode.rows(table.states)[0]) for episode in episodes])
     found = mean_interval(best.V[first] - returns)
-    more = value_error(table, best.policy) + left
+    more = counting_error(table, best.policy) + left
     return Interval(found.estimate, found.low - more, found.high + more)
 
 
-def value_error(table: Tabulation, policy: np.ndarray) -> float:
+def counting_error(table: Tabulation, policy: np.ndarray) -> float:
     """The error that counts leave in a policy's value from the first states, with 95 % confidence; these are taken as they are.
 
     Args:
@@ -96,4 +96,7 @@ def loss_told(row: Mapping[str, Any]) -> str:
     most = row["loses_at_most"]
     if most is None:
         return " What the agent loses against the best possible episodes that were not counted do not tell."
-    return f" By episodes that were not counted the agent loses at most {most:.3g} of value against the best possible."
+    return (
+        f" By episodes that were not counted the agent loses at most {most:.3g} of value against the best possible, "
+        "if the counts are as sure of that as of the table's best policy."
+    )

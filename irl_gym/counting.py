@@ -128,7 +128,7 @@ class Counting:
         found = np.where(visits.ravel() > 0, visits.ravel(), 1)[entry_rows(P)]
         frequencies = np.where(visits.ravel()[entry_rows(P)] > 0, successors.data / found, P.data)
         paid = float(seen.paid[:, 2].min()), float(seen.paid[:, 3].max())
-        samples = Samples(visits.astype(np.float64), frequencies, float(seen.n_episodes), paid)
+        samples = Samples(frequencies, float(seen.n_episodes), paid)
         table = Tabulation(TabularMDP(P, gamma, d0, visits), reward, payments, states, evidence, samples)
         return CountedTable(with_errors(table), counts)
 

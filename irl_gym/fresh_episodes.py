@@ -57,14 +57,12 @@ def compare_with_episodes(env: gym.Env, table: Tabulation, samples: Samples, *, 
     owner = np.repeat(np.arange(len(found)), [len(one[1]) for one in found])
     pairs = np.where(s == UNKNOWN, UNKNOWN, s * A + actions)
     new = _new(table, samples, pairs, following, paid)
-    _refuse_enumerated(table, samples, pairs, following, paid, new)
+    _refuse_enumerated(table, pairs, following, paid, new)
     statistic, degrees = _start(table, samples, first)
-    tried = pairs[pairs != UNKNOWN]
-    for row in np.unique(tried[samples.visits.ravel()[tried] > 0]):
+    tried, visits = pairs[pairs != UNKNOWN], table.row_samples.ravel()
+    for row in np.unique(tried[visits[tried] > 0]):
         part = slice(mdp.P.indptr[row], mdp.P.indptr[row + 1])
-        one, freedom = _two_samples(
-            following[pairs == row], mdp.P.indices[part], samples.frequencies[part], float(samples.visits.ravel()[row])
-        )
+        one, freedom = _two_samples(following[pairs == row], mdp.P.indices[part], samples.frequencies[part], float(visits[row]))
         statistic, degrees = statistic + one, degrees + freedom
     p_value = float(chi2.sf(statistic, degrees)) if degrees else 1.0
     hides = table.evidence.repeats is not None and table.evidence.repeats.hidden
@@ -105,10 +103,10 @@ def _new(
     table: Tabulation, samples: Samples, pairs: np.ndarray, following: np.ndarray, paid: np.ndarray
 ) -> np.ndarray:  # fmt: skip
     """(n,) steps that the samples do not have."""
-    mdp, entries = table.mdp, table.payments.entries
+    mdp, entries, visits = table.mdp, table.payments.entries, table.row_samples.ravel()
     known: dict[tuple[int, int], float] = {}
     for row in np.unique(pairs[pairs != UNKNOWN]).tolist():
-        if samples.visits.ravel()[row] > 0:
+        if visits[row] > 0:
             for i in range(mdp.P.indptr[row], mdp.P.indptr[row + 1]):
                 if samples.frequencies[i] > 0:
                     known[row, int(mdp.P.indices[i])] = np.nan if entries is None else float(entries[i])
@@ -119,11 +117,9 @@ def _new(
     )
 
 
-def _refuse_enumerated(
-    table: Tabulation, samples: Samples, pairs: np.ndarray, following: np.ndarray, paid: np.ndarray, new: np.ndarray
-) -> None:
+def _refuse_enumerated(table: Tabulation, pairs: np.ndarray, following: np.ndarray, paid: np.ndarray, new: np.ndarray) -> None:
     """A row that was enumerated has every successor."""
-    sure = (pairs != UNKNOWN) & np.isinf(samples.visits.ravel()[pairs])
+    sure = (pairs != UNKNOWN) & np.isinf(table.row_samples.ravel()[pairs])
     wrong = np.flatnonzero(new & sure)
     if wrong.size:
         i = wrong[0]
@@ -162,7 +158,7 @@ def _two_samples(found: np.ndarray, values: np.ndarray, shares: np.ndarray, n: f
 
 def _check_rewards(table: Tabulation, samples: Samples, pairs: np.ndarray, paid: np.ndarray) -> None:
     """Means of fresh rewards against those of the samples; what only a prior moved is not compared."""
-    mdp, visits = table.mdp, samples.visits.ravel()
+    mdp, visits = table.mdp, table.row_samples.ravel()
     size = visits.size
     kept = (pairs != UNKNOWN) & (visits[pairs] > 0)
     rows, m = pairs[kept], np.maximum(np.bincount(pairs[kept], minlength=size), 1)

@@ -23,6 +23,8 @@ from irl_gym.errors import InvalidDiscount, InvalidMDP
 from irl_gym.policies import as_distribution, policy_array
 
 ROW_SUM_TOLERANCE = 1e-9
+AS_GOOD_AS_EXACT = 10**9
+"""Visits of an exact row in a table of which other rows were counted."""
 
 
 class TransitionTable:

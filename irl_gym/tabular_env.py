@@ -48,7 +48,7 @@ class TabularEnv(gym.Env[Any, Any]):
         Raises:
             InvalidDiscount: gamma outside (0, 1).
         """
-        return TabularMDP(self.table.P, gamma, self.table.d0)
+        return TabularMDP(self.table.P, gamma, self.table.d0, self.table.visits)
 
     @property
     def P(self) -> dict[int, dict[int, list[tuple[float, int, float, bool]]]]:

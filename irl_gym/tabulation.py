@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import Matrix, Sparse
-from irl_gym.mdp import TabularMDP, TransitionTable, entry_positions, entry_rows
+from irl_gym.mdp import AS_GOOD_AS_EXACT, TabularMDP, TransitionTable, entry_positions, entry_rows
 from irl_gym.repeats import Repeats
 from irl_gym.rewards import RewardFunction, TabularReward
 from irl_gym.selfcheck import Payments, SelfCheck
@@ -72,8 +72,6 @@ class Evidence:
 class Samples:
     """The samples behind a table that is not exact."""
 
-    visits: Matrix
-    """(S, A) samples of each row; infinite where it was enumerated, 0 where a rule made it up."""
     frequencies: np.ndarray
     """(nnz,) the share of them that each entry of P had, in the order of P.data; P itself where there is no prior."""
     starts: float
@@ -98,6 +96,14 @@ class Tabulation:
     """How it was obtained."""
     samples: Samples | None = None
     """What it was estimated from; None where it is exact, of cells, or read from a file."""
+
+    @property
+    def row_samples(self) -> Matrix:
+        """(S, A) samples of each row of P: `mdp.visits`, but infinite where the row is exact; 0 where a rule made it up."""
+        visits = self.mdp.visits
+        if visits is None:
+            return np.full((self.mdp.n_states, self.mdp.n_actions), np.inf)
+        return np.where(visits >= AS_GOOD_AS_EXACT, np.inf, visits)
 
 
 def payments_of(table: TransitionTable, reward: RewardFunction) -> Payments:

@@ -57,8 +57,9 @@ def reward_error(table: Tabulation, samples: Samples) -> float | None:
     width = samples.rewards[1] - samples.rewards[0]
     if not width:
         return None
-    off = _off(table.payments.deviation.ravel(), width, samples.visits.ravel(), 1 - CONFIDENCE)
-    off = np.minimum(off + width * _moved(table.mdp, samples), width).reshape(samples.visits.shape)
+    n = table.row_samples
+    off = _off(table.payments.deviation.ravel(), width, n.ravel(), 1 - CONFIDENCE)
+    off = np.minimum(off + width * _moved(table.mdp, samples), width).reshape(n.shape)
     return float(off[~table.mdp.terminal].max(initial=0.0))
 
 
@@ -96,7 +97,7 @@ class _Rows:
 
     def __init__(self, table: Tabulation, samples: Samples, V: Vector | None, span: float, most: float):
         self.P, self.gamma, self.span, self.most = table.mdp.P, table.mdp.gamma, span, most
-        self.width, self.n = samples.rewards[1] - samples.rewards[0], samples.visits.ravel()
+        self.width, self.n = samples.rewards[1] - samples.rewards[0], table.row_samples.ravel()
         self.moved = _moved(table.mdp, samples)
         acting = np.repeat(table.mdp.reachable & ~table.mdp.terminal, table.mdp.n_actions)
         self.acting, peak = acting, np.zeros(self.n.size)
@@ -142,4 +143,4 @@ def _off(deviation: np.ndarray, width: float, n: np.ndarray, delta: float) -> np
 def _moved(mdp: TabularMDP, samples: Samples) -> np.ndarray:
     """(S*A,) the probability that the prior moved."""
     off = np.abs(mdp.P.data - samples.frequencies)
-    return np.bincount(entry_rows(mdp.P), weights=off, minlength=samples.visits.size) / 2
+    return np.bincount(entry_rows(mdp.P), weights=off, minlength=mdp.P.shape[0]) / 2

@@ -13,7 +13,7 @@ from inventory import Inventory, exact
 from rich.console import Console
 
 from irl_gym.comparisons import compare
-from irl_gym.confirmation import loss_by_episodes, value_by_episodes, value_error
+from irl_gym.confirmation import counting_error, loss_by_episodes, value_by_episodes
 from irl_gym.counting import Counting, Interaction, interact
 from irl_gym.diagnosis import doctor
 from irl_gym.dynamic_programming import policy_iteration
@@ -146,7 +146,7 @@ def test_a_cut_widens_the_value_by_what_was_left_out():
 def test_a_pair_that_was_counted_once_may_be_off_by_all_that_rewards_and_values_allow():
     found = Counting().table(interact(Inventory(), 15, seed=0), Inventory().observation_space, 11, gamma=0.95)
     best = policy_iteration(found.mdp, found.reward)
-    assert value_error(found, best.policy) > found.payments.largest
+    assert counting_error(found, best.policy) > found.payments.largest
 
 
 def test_ties_are_kept_on_a_table_counted_in_demonstrations():

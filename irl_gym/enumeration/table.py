@@ -29,13 +29,11 @@ from irl_gym.enumeration.outside import OutsideRandomness
 from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp import AS_GOOD_AS_EXACT, TabularMDP
 from irl_gym.reveal import known_hidden
 from irl_gym.tabulation import Evidence, Lines, Samples, Tabulation, from_lines
 from irl_gym.value_error import with_errors
 
-AS_GOOD_AS_EXACT = 10**9
-"""Visits that an enumerated row counts for, in a table of which other rows were counted."""
 OnStates = Callable[[int, int], None]
 """Called with the number of states tried and found, as the search goes on."""
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
@@ -217,16 +215,15 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -
     made = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=evidence)
     if evidence.exact:
         return made
-    visits = np.full(states.n_states * A, np.inf)
     sampled = np.array(sorted(explored.sampled), dtype=np.int64)
-    visits[place[sampled // A] * A + sampled % A] = limits.runs
-    visits = visits.reshape(states.n_states, A)
     if sampled.size:
-        counted = np.where(made.mdp.terminal[:, None], 0, np.minimum(visits, AS_GOOD_AS_EXACT)).astype(np.int64)
-        made = replace(made, mdp=TabularMDP(made.mdp.P, gamma, made.mdp.d0, counted))
+        visits = np.full(states.n_states * A, AS_GOOD_AS_EXACT)
+        visits[place[sampled // A] * A + sampled % A] = limits.runs
+        visits = np.where(made.mdp.terminal[:, None], 0, visits.reshape(-1, A))
+        made = replace(made, mdp=TabularMDP(made.mdp.P, gamma, made.mdp.d0, visits))
     starts = limits.start_runs if explored.starts_counted else math.inf
     paid = min(explored.rewards), max(explored.rewards)
-    samples = Samples(visits, made.mdp.P.data, starts, paid)
+    samples = Samples(made.mdp.P.data, starts, paid)
     return with_errors(replace(made, samples=samples))
 
 

@@ -22,6 +22,11 @@ from irl_gym.mdp import TransitionTable
 
 OPTIMAL_SHARE = 1e-6
 """Share of the scale that an optimal expert may lose."""
+AT_STAKE = (
+    "At stake: what the best policy has over random actions, or if that is less, the span of its values over the states that "
+    "it or the expert visits."
+)
+"""The scale, in a sentence."""
 FLAT = 64 * EPSILON
 """Share of |V*| below which its span is rounding."""
 

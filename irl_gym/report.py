@@ -13,6 +13,7 @@ from irl_gym.claims import ENVIRONMENT
 from irl_gym.confirmation import loss_told
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import as_interval
+from irl_gym.optimality import AT_STAKE
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
 from irl_gym.scores import score_of
@@ -162,11 +163,9 @@ def _reward(report: Report) -> Table:
     table.add_column("is")
     for what, told in told_of_reward(reward, report.metrics):
         table.add_row(what, told)
-    table.caption = (
-        "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
-        if "worst_tie_regret" in reward
-        else ""
-    ) + _CAPTIONS.get(reward["learner"], "")
+    tie = "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
+    told = (tie if "worst_tie_regret" in reward else "", f"{AT_STAKE} " if reward.get("loss_share") is not None else "")
+    table.caption = "".join(told) + _CAPTIONS.get(reward["learner"], "")
     table.caption_justify = "left"
     return table
 

@@ -10,7 +10,7 @@ from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
-from irl_gym.optimality import told_record
+from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -144,6 +144,8 @@ def certificate(run: Run) -> Section:
     """What the learned reward proves, line by line, and the raw numbers behind it."""
     raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
     lead = "Recomputed from the table, the expert and the reward alone; nothing is taken from the solver's word."
+    if run.metrics["reward"].get("loss_share") is not None:
+        lead = f"{lead} {AT_STAKE}"
     if run.table is None:
         lead = "Recomputed from the sampled trajectories and the reward alone; nothing is taken from the solver's word."
     shown = {"lines": list(_lines(run)), "raw": raw}

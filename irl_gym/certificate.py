@@ -20,10 +20,10 @@ from irl_gym.dynamic_programming import optimum
 from irl_gym.howard import Optimum
 from irl_gym.margins import Margins, comparable, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
-from irl_gym.optimality import loss_of, told_loss
+from irl_gym.optimality import loss_on, told_loss
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
-from irl_gym.sampling_error import counted_table
+from irl_gym.sampling_error import told_by_counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +111,7 @@ class Certificate(Proven):
             f"margins                  {span}",
             self.optimality,
         ]
-        if self.sampling_error is not None:
-            lines.append(f"judged on                {counted_table(self.sampling_error)}")
-        if self.unsettled.size:
-            lines.append(f"unsettled                in {self.unsettled.size} states a margin is within its sampling error")
+        lines += told_by_counts(self.sampling_error, self.unsettled.size)
         if np.isfinite(self.least_l1_norm):
             above = max(self.l1_norm - self.least_l1_norm, 0.0)
             lines.append(f"||R||_1                  {self.l1_norm:.6g}, at most {above:.1e} above the least with these margins")
@@ -128,7 +125,9 @@ class Certificate(Proven):
             lines.append(f"no margin                in {self.marginless.size} states, where ties remain")
         if self.unbreakable.size:
             count, states = len(self.unbreakable_rows), self.unbreakable.size
-            lines.append(f"unbreakable              {count} rows of (4), in {states} states, that no such reward makes strict")
+            lines.append(
+                f"unbreakable              {count} rows of (4), in {states} states, that no reward makes strict if all hold"
+            )
         if self.violated.size:
             count, states, most = self.violations.size, self.violated.size, self.violations.max()
             lines.append(f"violated                 {count} rows of (4), in {states} states, by at most {most:.2e}")
@@ -235,7 +234,8 @@ def judged(
     without = kept & (margins.values <= margins.none)
     which = np.flatnonzero(active & margins.violated(to_both))
     states = rows[comparisons.states[which]].astype(np.int64)
-    loss = loss_of(found, comparisons.distribution, unknown)
+    whole = part if comparisons.sampling is None else mdp.restrict(rows)
+    loss = loss_on(whole, found, comparisons.distribution, unknown)
     error, unsettled = None, np.zeros_like(kept)
     if comparisons.sampling is not None:
         error, unsettled = comparisons.sampling.unsettled(margins.values, margins.worth, kept, margins.none)

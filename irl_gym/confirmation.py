@@ -4,12 +4,13 @@ A value computed on counts is an estimate, and the best of many estimates is too
 upwards. Episodes that were not counted have neither error. Of N of them, with discounted returns G and first states s_0,
 
     value     the mean of G, with its 95 % interval
-    loss      the mean of V(s_0) - G, V the best value by the table: what the policy loses against the best possible at most
+    loss      the mean of V(s_0) - G, V the best value by the table: what the policy loses against the table's best policy
 
-The best policy is worth no more than V but for the error that the counts leave in *its* value; that of the table's best stands
-for it: 1.96 sqrt(sum_sa mu(s, a)^2 Var(r + gamma V(s')) / (n(s, a) - 1)), mu how often a step is taken, discounted. A step of
-which less than two were counted may be off by all that rewards and V allow. An episode that is cut after T steps leaves out
-gamma^T / (1 - gamma) of the largest reward seen at most, which widens both.
+That policy is worth no more than V, which was picked for being large, but for the error that the counts leave in its value:
+1.96 sqrt(sum_sa mu(s, a)^2 Var(r + gamma V(s')) / (n(s, a) - 1)), mu how often a step is taken, discounted. A step of which
+less than two were counted may be off by all that rewards and V allow. What a policy that is better yet would earn is bounded by
+`value_error`, which covers them all and is wider for it. An episode that is cut after T steps leaves out gamma^T / (1 - gamma)
+of the largest reward seen at most, which widens both.
 Axes: S states, A actions, N episodes.
 """
 
@@ -42,7 +43,7 @@ def value_by_episodes(table: Tabulation, episodes: Sequence[Episode], horizon: i
 
 
 def loss_by_episodes(table: Tabulation, episodes: Sequence[Episode]) -> Interval:
-    """What the policy of some episodes loses against the best possible: an estimate, and with 97.5 % no more than `high`.
+    """What the policy of some episodes loses against the table's best: an estimate, with 95 % confidence no more than `high`.
 
     Args:
         table: a counted one.
@@ -95,8 +96,8 @@ def loss_told(row: Mapping[str, Any]) -> str:
         return ""
     most = row["loses_at_most"]
     if most is None:
-        return " What the agent loses against the best possible episodes that were not counted do not tell."
+        return " Episodes that were not counted do not tell what the agent loses against the policy that is best by the table."
     return (
-        f" By episodes that were not counted the agent loses at most {most:.3g} of value against the best possible, "
-        "if the counts are as sure of that as of the table's best policy."
+        f" By episodes that were not counted the agent loses at most {most:.3g} of value against the policy that is best by "
+        "the table, with 95 % confidence."
     )

@@ -5,7 +5,8 @@
 The expert is optimal where the loss is at most `OPTIMAL_SHARE` of the scale: yes, no, or undecided where the bounds of both do
 not settle it. The smaller of the two scales counts, so that an outlier of R which only bad actions reach, or only a gamble,
 does not dilute a loss. Where V* is flat over those states, to float64 or to what the solver of R left open, their largest |V*|
-takes the place of its span; where every action everywhere is tied there is no scale, and nothing to lose.
+takes the place of its span, or if that is 0 to float64 too, what the terms of V* add up to without their signs (payments that
+cancel); where every action everywhere is tied there is no scale, and nothing to lose.
 Axes: S states, A actions.
 """
 
@@ -15,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym._typing import Matrix, StateMask
+from irl_gym._typing import ActionSets, Matrix, StateMask
 from irl_gym.discounted import EPSILON
+from irl_gym.dynamic_programming import optimum
 from irl_gym.howard import OUTWARDS, Optimum
-from irl_gym.mdp import TransitionTable
+from irl_gym.mdp import TabularMDP, TransitionTable
 
 OPTIMAL_SHARE = 1e-6
 """Share of the scale that an optimal expert may lose."""
@@ -55,8 +57,12 @@ class Loss:
 
     @property
     def share(self) -> float:
-        """The loss as a share of the scale, at most; NaN where there is no scale."""
-        return float("nan") if self.tied or not self.scale_low > 0 else self.high / self.scale_low
+        """The loss as a share of the scale, at most; NaN where every action is tied."""
+        if self.tied:
+            return float("nan")
+        if self.high == 0:
+            return 0.0
+        return self.high / self.scale_low if self.scale_low > 0 else float("inf")
 
     def __str__(self) -> str:
         return told_loss(self.optimal, self.low, self.high, self.share)
@@ -89,7 +95,7 @@ def told_record(record: Mapping[str, Any]) -> str | None:
     told = told_loss(record["expert_optimal"], *bounds, record.get("unknown_states") or 0)
     count = record.get("violated_states")
     where = "1 state" if count == 1 else f"{count} states"
-    return f"{told}; (4) is violated in {where}, by at most {record['worst_violation']:.3g}" if count else told
+    return f"{told}; another action is better in {where}, by at most {record['worst_violation']:.3g}" if count else told
 
 
 def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:
@@ -100,30 +106,53 @@ def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) ->
         expert: (S, A) probabilities.
         unknown: (S,) states in which the expert may do anything: the bounds are over all that it may do there.
     """
-    mdp, e = found.table.mdp, found.error
-    nowhere = np.zeros(mdp.n_states, dtype=bool)
+    mdp, e, nowhere = found.table.mdp, found.error, np.zeros(found.policy.size, dtype=bool)
     below, above = found.shortfall(expert, nowhere if unknown is None else unknown)
     low, high = _sum(mdp.d0, below - e, -1), _sum(mdp.d0, above + found.above, 1)
     random = found.shortfall(np.full(expert.shape, 1 / expert.shape[1]), nowhere)
     gain = max(_sum(mdp.d0, random[0] - e, -1), 0.0), _sum(mdp.d0, random[1] + found.above, 1)
-    visited = _visited(found, expert)
-    h, unsure = found.W.differences[visited], e[visited].astype(np.longdouble)
-    span = float((h - unsure).max() - (h + unsure).min()) * (1 - OUTWARDS), float((h + unsure).max() - (h - unsure).min())
-    largest = float(np.abs(h + np.longdouble(found.W.constant)).max())
-    if span[1] <= max(FLAT * largest, found.table.reward.tolerance * found.table.horizon):
-        span = largest * (1 - OUTWARDS) - float(unsure.max()), largest * (1 + OUTWARDS) + float(unsure.max())
+    span = _span(found, expert)
     tied = bool(found.tied()[~mdp.terminal].all())
-    scale = min(gain[0], max(span[0], 0.0)), min(gain[1], span[1] * (1 + OUTWARDS))
-    return Loss(max(low, 0.0), max(high, 0.0), *scale, tied)
+    return Loss(max(low, 0.0), max(high, 0.0), min(gain[0], max(span[0], 0.0)), min(gain[1], span[1]), tied)
 
 
-def _visited(found: Optimum, expert: Matrix) -> StateMask:
-    """(S,) the states that the expert or an optimal policy visits: one that does what the expert does, where that is tied."""
+def loss_on(table: TabularMDP, found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:
+    """The same where the optimum is of a counted table as it was compared (`comparisons.as_compared`), and of the table itself.
+
+    Whether actions that the counts do not tell from the expert's lead where its own do is not known: the bounds allow both.
+    """
+    one = loss_of(found, expert, unknown)
+    if found.table.mdp is table:
+        return one
+    other = loss_of(optimum(table, found.table.reward), expert, unknown)
+    scale = min(one.scale_low, other.scale_low), max(one.scale_high, other.scale_high)
+    return Loss(min(one.low, other.low), max(one.high, other.high), *scale, one.tied and other.tied)
+
+
+def _span(found: Optimum, expert: Matrix) -> tuple[float, float]:
+    """Bounds of the span of V* over the states that the expert or an optimal policy visits, or of what stands for it."""
+    visited, taken = _visited(found, expert)
+    h, e = found.W.differences[visited], found.error[visited].astype(np.longdouble)
+    low, high, unsure = float((h - e).max() - (h + e).min()), float((h + e).max() - (h - e).min()), float(e.max())
+    largest = float(np.abs(h + np.longdouble(found.W.constant)).max())
+    size = float(found.advantages.size[taken].max(initial=0.0))
+    if high > max(FLAT * max(largest, size), found.table.reward.tolerance * found.table.horizon):
+        return low * (1 - OUTWARDS), high * (1 + OUTWARDS)
+    scale = largest if largest > max(FLAT * size, unsure) else size
+    return scale * (1 - OUTWARDS) - unsure, scale * (1 + OUTWARDS) + unsure
+
+
+def _visited(found: Optimum, expert: Matrix) -> tuple[StateMask, ActionSets]:
+    """(S,) the states that the expert or an optimal policy visits, and (S, A) what these do there.
+
+    The optimal policy does what the expert does, where that is tied.
+    """
     mdp = found.table.mdp
     like = (found.tied() | (expert == 0)).all(axis=1)
     optimal = np.where(like[:, None], expert, np.eye(mdp.n_actions)[found.policy])
-    one, other = (TransitionTable(mdp.P_pi(policy), mdp.d0).reachable for policy in (expert, optimal))
-    return one | other
+    reached = [TransitionTable(mdp.P_pi(policy), mdp.d0).reachable for policy in (expert, optimal)]
+    taken = (expert > 0) & reached[0][:, None] | (optimal > 0) & reached[1][:, None]
+    return reached[0] | reached[1], taken
 
 
 def _sum(d0: np.ndarray, values: np.ndarray, side: int) -> float:

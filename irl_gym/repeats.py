@@ -57,7 +57,7 @@ class Repeats:
         if self.of == "successors":
             told += f"after {self.alike:,} of which the same follows as the last time, {self.expected:,.0f} by chance"
         else:
-            told += "of which each is paid as the last was, more or less than by chance"
+            told += "whose rewards are alike, more or less than chance makes them"
         return f"{'found' if self.hidden else 'none seen'}: {told}; {p}"
 
 

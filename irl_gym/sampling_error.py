@@ -84,7 +84,16 @@ class SamplingError:
 
 def counted_table(error: float | None) -> str:
     """What is judged on a counted table; with the error of its margins where that is known."""
-    return "a counted table" + ("" if error is None else f", margins within {error:.2g} with 95 % confidence")
+    return "a counted table" + (
+        "" if error is None else f", margins within {error:.2g} with 95 % confidence if later values are right"
+    )
+
+
+def told_by_counts(error: float | None, unsettled: int) -> list[str]:
+    """What a certificate on a counted table says of it; no line of an exact one."""
+    lines = [] if error is None else [f"judged on                {counted_table(error)}"]
+    where = "1 state" if unsettled == 1 else f"{unsettled} states"
+    return lines + ([f"unsettled                in {where} a margin is within its sampling error"] if unsettled else [])
 
 
 def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndarray, actions: np.ndarray) -> SamplingError:

@@ -78,8 +78,8 @@ class SelfCheck:
         share = mean_interval(np.repeat([1.0, 0.0], [self.new_episodes, self.episodes - self.new_episodes]), possible=(0, 1))
         return (
             f"{seen}, in {self.episodes:,} fresh episodes: {self.new_steps:,} steps that the table has never seen, in "
-            f"{share.estimate:.1%} of episodes ({share.low:.1%} to {share.high:.1%}); the others as two samples of one: "
-            f"p = {self.p_value:.2g}"
+            f"{share.estimate:.1%} of episodes ({share.low:.1%} to {share.high:.1%}); the rest agree with the table's own "
+            f"samples: p = {self.p_value:.2g}"
         )
 
 

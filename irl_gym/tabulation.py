@@ -63,8 +63,9 @@ class Evidence:
         sure = f"within {self.error:.2g} for sampling noise, with 95 % confidence, if observations hide no state"
         told = {"probabilities": sure}
         for name, off in (("mean rewards", self.reward_error), ("values planned on it", self.value_error)):
+            told[name] = "not known, as all steps paid the same"
             if off is not None:
-                told[name] = f"within {off:.2g}, likewise"
+                told[name] = f"within {off:.2g}, likewise, if no step pays less or more than was seen"
         return told
 
 

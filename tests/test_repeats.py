@@ -33,7 +33,7 @@ def test_a_number_drawn_at_reset_that_decides_what_follows_is_found(seed):
 @pytest.mark.parametrize("seed", range(12))
 def test_a_number_drawn_at_reset_that_decides_what_is_paid_is_found(seed):
     told = found(PaidByMood(), 20_000, seed)
-    assert told.hidden and told.of == "rewards" and "each is paid as the last was" in str(told)
+    assert told.hidden and told.of == "rewards" and "rewards are alike" in str(told)
 
 
 def test_the_pair_that_tells_most_is_named():

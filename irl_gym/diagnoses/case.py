@@ -209,12 +209,20 @@ class Case:
         usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
         return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
 
+    @property
+    def _kept(self) -> np.ndarray:
+        """(n,) rows that a margin is taken over: those that the certificate lists as unbreakable are left out one by one."""
+        assert self.rows is not None
+        pairs = np.array(self.claims.get("unbreakable_rows") or np.zeros((0, 2)), dtype=np.int64)
+        n = self.distribution.shape[1]
+        return self.rows.usable & ~np.isin(self.rows.states * n + self.rows.actions, pairs @ np.array([n, 1]))
+
     @cached_property
     def least(self) -> Vector:
         """(S,) the smallest margin of each state; NaN where it has no row that a reward can move."""
         if self.rows is None or self.mdp is None or self.reward is None:
             return np.full(self.acting.size, np.nan)
-        usable = self.rows.usable
+        usable = self._kept
         return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
 
     @cached_property
@@ -235,7 +243,7 @@ class Case:
         """(S,) states in which every row that R can move has a margin."""
         if self.rows is None or self.mdp is None or self.reward is None:
             return np.zeros_like(self.acting)
-        usable = self.rows.usable
+        usable = self._kept
         left = least_per_state((self.rows.margins - self.rows.none)[usable], self.rows.states[usable], self.mdp.n_states)
         return left > 0
 

@@ -131,7 +131,7 @@ def constant_reward(case: Case) -> Finding | None:
     if not case.on_states:
         paid = paid[case.acting[case.states]]
     same = float(np.ptp(paid)) <= 1e-9 * case.scale
-    if not same and case.prefers:
+    if case.margins.size or (not same and case.prefers):
         return None
     what = f"is {paid.flat[0]:.4g} in every reachable state" if same else "pays every action alike in every reachable state"
     ends = case.states[case.mdp.terminal[case.states]]

@@ -99,7 +99,7 @@ def unconfirmed(case: Case) -> Finding | None:
             return Finding(
                 "table-not-confirmed",
                 f"By the counted table {whose} earns {value:.4g}, by episodes that were not counted {row['sampled_value']:.4g} "
-                f"({low:.4g} to {high:.4g}): what is planned and judged on this table is off by more than noise.",
+                f"({low:.4g} to {high:.4g}): what is judged on this table is off by more than the noise of these episodes.",
                 "More steps to count. If it stays, the observation hides part of the state.",
                 flags=("--table sample", "--steps"),
             )

@@ -184,7 +184,6 @@ class FeatureLP:
             short,
             tolerance,
             bool(np.abs(values).max() <= NOTHING * found.rows.scale),
-            None,
         )
         certificate = self._certificate(found, solved, judged, error)
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
@@ -248,6 +247,9 @@ class FeatureLP:
             zero=not alpha.any(),
             indifferent=judged.indifferent,
             standard_error=error,
+            unknown=judged.unknown,
+            sampling_error=judged.sampling_error,
+            unsettled=judged.unsettled,
         )
 
     def _stats(self, weights: Weights, found: FeatureRows) -> dict[str, Any]:

@@ -5,7 +5,7 @@ model: the rows of the sample, with their standard errors. The bound above every
 valid for any duals. Axes: S states, A actions, K features.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,13 @@ import numpy as np
 from irl_gym._typing import Indices
 from irl_gym.comparisons import as_compared, compare
 from irl_gym.dynamic_programming import optimum
-from irl_gym.margins import least_per_state, margins_of
+from irl_gym.margins import comparable, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
-from irl_gym.optimality import Loss, loss_of, told_loss
+from irl_gym.optimality import Loss, loss_on, told_loss
 from irl_gym.policies import as_distribution
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward
+from irl_gym.sampling_error import told_by_counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,12 @@ class FeatureCertificate(Proven):
     """Is the expert tied, to rounding, with every action in every state judged?"""
     standard_error: float | None
     """The largest standard error of a row of (10) under R; None where the rows are exact or had one rollout."""
+    unknown: Indices
+    """Reachable states, not terminal, in which nothing is known of the expert; none of a generative model."""
+    sampling_error: float | None
+    """The largest error of a margin on a counted table, of pairs that were visited; None where there is none."""
+    unsettled: Indices
+    """Reachable states of a counted table in which a margin above 0 is within its sampling error."""
 
     @property
     def degenerate(self) -> bool:
@@ -83,25 +90,29 @@ class FeatureCertificate(Proven):
     def _optimal(self) -> str:
         if self.loss_low is None or self.loss_bound is None:
             return "yes, to two standard errors in S_0" if self.expert_optimal else "no, (10) is violated in S_0"
-        return told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share)
+        return told_loss(self.expert_optimal, self.loss_low, self.loss_bound, self.loss_share, self.unknown.size)
 
     def __str__(self) -> str:
         """The certificate in a few lines a person reads."""
         finite = self.margin[np.isfinite(self.margin)]
+        span = f"{finite.min():.3g} to {finite.max():.3g} in {finite.size} states" if finite.size else "none"
         lines = [
             f"expert optimal under R   {self._optimal}",
-            f"margins                  {finite.min():.3g} to {finite.max():.3g} in {finite.size} states",
+            f"margins                  {span}",
             self.optimality,
             f"sample                   {self.states} states; {self.trivial} more have no other successors to compare",
             f"features                 {self.n_features}; the rows have rank {self.rank}",
         ]
+        lines += told_by_counts(self.sampling_error, self.unsettled.size)
         if self.violated.size:
             lines.append(f"violated                 (4) in {self.violated.size} states, by at most {self.worst_violation:.2e}")
         if not self.expressible:
             lines.append("expressible              no reward in the span of the features makes the expert optimal")
         if self.unbreakable.size:
             count, states = len(self.unbreakable_rows), self.unbreakable.size
-            lines.append(f"unbreakable              {count} rows of (10), in {states} states, that no such weights make strict")
+            lines.append(
+                f"unbreakable              {count} rows of (10), in {states} states, that no weights make strict if all hold"
+            )
         if self.degenerate:
             lines.append(f"degenerate               {'R is zero' if self.zero else 'R ties the expert with every action'}")
         if self.standard_error is not None:
@@ -121,8 +132,14 @@ class Judged:
     """A violation below this is none; one number, or one for each state."""
     indifferent: bool
     """Is the expert tied with every action in every state judged?"""
-    loss: Loss | None
+    loss: Loss | None = None
     """What the best policy earns more; None where there is no table."""
+    unknown: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """States of the table in which nothing is known of the expert."""
+    sampling_error: float | None = None
+    """The largest error of a margin that a counted table leaves."""
+    unsettled: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """States with a margin within it."""
 
 
 def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: TabularReward, ties: np.ndarray) -> Judged:
@@ -134,13 +151,26 @@ def judge_table(mdp: TabularMDP, expert: Any, known: np.ndarray, reward: Tabular
     part, distribution = mdp.restrict(rows), as_distribution(expert, mdp.n_states, mdp.n_actions)[rows]
     seen = known[rows] | part.terminal
     c = compare(part, distribution, np.flatnonzero(seen))
-    found = optimum(as_compared(part, c, True), reward.of_rows(rows))
+    R = reward.of_rows(rows)
+    found = optimum(as_compared(part, c, True), R)
     margins = margins_of(found, c)
     left_out = np.isin(rows[c.states] * mdp.n_actions + c.actions, ties @ [mdp.n_actions, 1])
-    kept = ~c.equal & ~left_out
+    kept = comparable(c, R) & ~left_out
     margin, short, none = np.full((3, mdp.n_states), np.nan)
     margin[rows] = least_per_state(margins.values[kept], c.states[kept], part.n_states)
     short[rows] = -least_per_state(-margins.violations(c.equal), c.states, part.n_states)
     none[rows] = -least_per_state(-margins.none, c.states, part.n_states)
     indifferent = bool((np.abs(margins.values) <= margins.none).all())
-    return Judged(margin, np.nan_to_num(short), np.nan_to_num(none), indifferent, loss_of(found, distribution, ~seen))
+    error, open_ = None, np.zeros_like(kept)
+    if c.sampling is not None:
+        error, open_ = c.sampling.unsettled(margins.values, margins.worth, kept, margins.none)
+    return Judged(
+        margin,
+        np.nan_to_num(short),
+        np.nan_to_num(none),
+        indifferent,
+        loss_on(part, found, distribution, ~seen),
+        rows[~seen],
+        error,
+        rows[np.unique(c.states[open_])],
+    )

@@ -112,7 +112,7 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
     yield "score of the retrained agent", told["retrained"]["score"]
     for name in ("retrained", "expert", "random"):
         yield f"mean return (95 %), {told[name]['name']}", told[name]["returns"]
-    yield "judged by the worse of the two", judged(policies, run.metrics.get("table")).brief
+    yield "judged by the worse of score and mean return", judged(policies, run.metrics.get("table")).brief
     for name in ("retrained", "expert", "random"):
         yield f"value, {told[name]['name']}", told[name]["value"]
     if any(row["agreement"] is not None for row in policies.values()):

@@ -83,7 +83,7 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
         "mean return of random actions and of the expert": " and ".join(
             number(returns[name].estimate) for name in ("random", "expert")
         ),
-        "judged by the worse of the two": pool.judged.brief,
+        "judged by the worse of score and mean return": pool.judged.brief,
         "score of the worst and the best seed": "none"
         if scores is None
         else " and ".join(map(score_of, (scores.min(), scores.max()))),

@@ -201,7 +201,10 @@ _COUNTS = {
     "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
     "marginless": ("Without a margin", "the expert is only tied with another action"),
     "unsettled": ("Left open by the counts", "a margin of the expert is within its sampling error, and may be noise"),
-    "unbreakable": ("Always tied", "some action ties with the expert's under every such reward that makes the expert optimal"),
+    "unbreakable": (
+        "Always tied",
+        "some action ties with the expert's under every reward of this kind that makes the expert optimal",
+    ),
     "unknown": ("Expert not seen", "nothing is asked of its actions there"),
     "violated": ("Violated", "another action is better there under the learned reward"),
     "unconstrained": ("Without a comparison", "all actions do the same there"),

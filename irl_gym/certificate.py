@@ -21,6 +21,7 @@ from irl_gym.howard import Optimum
 from irl_gym.margins import Margins, comparable, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
 from irl_gym.optimality import loss_on, told_loss
+from irl_gym.policies import policy_array
 from irl_gym.proven import Proven
 from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.sampling_error import told_by_counts
@@ -175,7 +176,7 @@ def certify(
     rows = np.flatnonzero(mdp.reachable)
     part = mdp.restrict(rows)
     mdp.mixing(expert)  # checks shape and content for all states
-    comparisons = compare(part, np.asarray(expert)[rows])
+    comparisons = compare(part, policy_array(expert)[rows])
     R = reward.of_rows(rows)
     found = optimum(as_compared(part, comparisons, R.on_states), R)
     margins = margins_of(found, comparisons)

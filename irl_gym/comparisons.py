@@ -91,7 +91,7 @@ def as_compared(mdp: TabularMDP, comparisons: Comparisons, on_states: bool) -> T
     """
     if comparisons.sampling is None or not on_states or not comparisons.trivial.any():
         return mdp
-    same = comparisons.trivial & ~comparisons.equal
+    same = comparisons.trivial
     pairs = comparisons.states[same] * mdp.n_actions + comparisons.actions[same]
     kept = np.ones(mdp.P.shape[0])
     kept[pairs] = 0.0

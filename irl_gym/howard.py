@@ -17,14 +17,15 @@ import scipy.sparse as sp
 from irl_gym._typing import Actions, ActionSets, Matrix, Sparse, StateMask, Vector
 from irl_gym.discounted import EPSILON, Discounted
 from irl_gym.envelopes import least, most
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.mdp import TabularMDP
 from irl_gym.precise import EPSILON_LONG, LONG, Advantages, PreciseTable, Split
 from irl_gym.rewards import TabularReward
 
-TIED = 1e-11
-"""Actions are tied whose values differ by less, as a share of the terms these are made of: what rounding leaves of float64
-tables, in which 1/3 + 1/3 + 1/3 need not be 1."""
+TIED = 4 * EPSILON
+"""What rounding makes of a sum, as a share of its terms: 1/3 + 1/3 + 1/3 need not be 1 in a table of float64."""
+CAREFUL = 1e-10
+"""Share of the terms, times 1 - gamma, up to which a policy takes an action for tied: a loss is paid at each of so many steps."""
 WORTHWHILE = 1e-15
 """Share of the same terms below which nothing is improved."""
 LAST_IMPROVEMENTS = 30
@@ -71,7 +72,7 @@ class Optimum:
         weights = distribution / distribution.sum(axis=1, keepdims=True)
         lost = -(weights * found.values).sum(axis=1)
         unsure = (weights * (found.rounding + (mdp.n_actions + 8) * EPSILON * np.abs(found.values))).sum(axis=1)
-        P_pi, sums = mdp.P_pi(weights), 0 if (weights.max(axis=1) == 1).all() else 2 * mdp.n_actions
+        P_pi, sums = mdp.P_pi(weights), 2 * mdp.n_actions * int((weights > 0).sum() > weights.shape[0])
         discounted = Discounted(P_pi, mdp.gamma, sums=sums)
         behind = discounted.solve(lost.astype(np.float64))
         long = behind.astype(LONG)
@@ -110,27 +111,34 @@ class Optimum:
 
     @cached_property
     def gaps(self) -> tuple[Matrix, Matrix]:
-        """(S, A) and (S, A): what an action is worth less than the best, V*(s) - Q*(s, a), lies between them."""
+        """(S, A) what an action is worth less than the best, V*(s) - Q*(s, a), and (S, A) how far that can be off."""
         return self.less_than(np.zeros(self.policy.size), self.error)
 
     def less_than(self, behind: Vector, unsure: Vector) -> tuple[Matrix, Matrix]:
-        """(S, A) and (S, A): V(s) - Q(s, a) lies between them, where V is `behind` W (S,) by as much as is `unsure` (S,)."""
+        """(S, A) V(s) - Q(s, a), where V is `behind` W (S,), and (S, A) how far that can be off, if V is by `unsure` (S,)."""
         mdp, shape = self.table.mdp, self.blocked.shape
         onwards = mdp.gamma * (mdp.P @ np.stack([behind, unsure, np.abs(behind)], axis=1)).T.reshape(3, *shape)
         gap = (onwards[0] - behind[:, None]) - self.advantages.values.astype(np.float64)
         rounding = self.table.terms * EPSILON * (onwards[2] + np.abs(behind)[:, None] + np.abs(gap))
-        wide = (self.advantages.rounding + unsure[:, None] + onwards[1]) * (1 + OUTWARDS) + rounding
-        return gap - wide, gap + wide
+        return gap, (self.advantages.rounding + unsure[:, None] + onwards[1]) * (1 + OUTWARDS) + rounding
 
-    @property
+    @cached_property
     def level(self) -> Matrix:
-        """(S, A) a difference of action values up to this is the rounding of the table's own numbers."""
-        return TIED * self.advantages.size
+        """(S, A) what the rounding of the table's own numbers can make of a difference of action values, to first order.
+
+        Of the terms of the step itself, and of those of all later ones.
+        """
+        mdp, states = self.table.mdp, np.arange(self.policy.size)
+        own = TIED * self.advantages.size
+        discounted = Discounted(mdp.P[states * mdp.n_actions + self.policy], mdp.gamma)
+        later = np.maximum(discounted.solve(own[states, self.policy]), 0.0)
+        return own + later[:, None] + mdp.gamma * (mdp.P @ later).reshape(own.shape)
 
     def tied(self) -> ActionSets:
         """(S, A) the actions that a policy may take for the best: tied, and the closer the more steps pay for it."""
         gains = np.where(self.blocked, -np.inf, self.advantages.values)
-        return gains >= gains.max(axis=1, keepdims=True) - self.level * min(1.0, 10 * (1 - self.table.mdp.gamma))
+        careful = CAREFUL * (1 - self.table.mdp.gamma) * self.advantages.size
+        return gains >= gains.max(axis=1, keepdims=True) - np.minimum(self.level, careful)
 
     def bound(self, policy: Actions) -> float:
         """|W - V*| and V* - V_policy are at most this in every state: cheaper than `error`, and wider where R has outliers."""
@@ -153,6 +161,7 @@ def howard(mdp: TabularMDP, reward: TabularReward, blocked: np.ndarray, max_iter
     """The best policy among the actions that are not blocked (S, A).
 
     Raises:
+        InvalidReward: values that overflow.
         InvalidParameter: `max_iterations` spent.
     """
     R, states, seen = reward.expected(mdp), np.arange(mdp.n_states), set()
@@ -160,6 +169,10 @@ def howard(mdp: TabularMDP, reward: TabularReward, blocked: np.ndarray, max_iter
     for iteration in range(1, max_iterations + 1):
         discounted = Discounted(mdp.P[states * mdp.n_actions + policy], mdp.gamma)
         V = np.where(mdp.terminal, 0.0, discounted.solve(R[states, policy]))
+        if not np.isfinite(V).all():
+            raise InvalidReward(
+                f"the reward is up to {paid.max():.3g}, too large at gamma {mdp.gamma:g}: values overflow. Scale it."
+            )
         onwards = mdp.gamma * (mdp.P @ np.stack([V, np.abs(V)], axis=1))
         Q = np.where(blocked, -np.inf, R + onwards[:, 0].reshape(R.shape))
         size = paid + onwards[:, 1].reshape(R.shape) + np.abs(V)[:, None]

@@ -51,7 +51,7 @@ class Margins:
     values: np.ndarray
     """(n,) the expert's action less the other, in units of value."""
     unsure: np.ndarray
-    """(n,) they are within this of the exact ones."""
+    """(n,) they are within this of the exact ones, on a counted table of those of the same later values."""
     none: np.ndarray
     """(n,) a margin or a violation up to this is none: the rounding of the table's numbers, and what the solver of R left."""
     worth: Vector
@@ -67,7 +67,7 @@ class Margins:
 
     def hold(self, equal: np.ndarray) -> np.ndarray:
         """(n,) rows that hold for certain."""
-        return self.violations(equal) + self.unsure <= self.none
+        return np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
 
 
 def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None = None) -> Margins:
@@ -76,14 +76,12 @@ def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None
     `tolerance` is what the solver of R left open; None for the reward's own.
     """
     behind, unsure = found.behind(comparisons.distribution)
-    low, high = found.less_than(behind, unsure)
-    return _margins(found, comparisons, (low + high) / 2, (high - low) / 2, found.V - behind, tolerance)
+    return _margins(found, comparisons, *found.less_than(behind, unsure), found.V - behind, tolerance)
 
 
 def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
     """The same where everybody acts best afterwards: Q*(s, pi) - Q*(s, a)."""
-    low, high = found.gaps
-    gap, wide, mine = (low + high) / 2, (high - low) / 2, comparisons.distribution
+    (gap, wide), mine = found.gaps, comparisons.distribution
     gap = gap - (mine * gap).sum(axis=1, keepdims=True)
     return _margins(found, comparisons, gap, wide + (mine * wide).sum(axis=1, keepdims=True), found.V, None)
 
@@ -95,4 +93,5 @@ def _margins(
     left = reward.tolerance if tolerance is None else tolerance
     worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
     moved = ~(comparisons.trivial & reward.on_states)  # the others are 0 whatever the reward
-    return Margins(values[at] * moved, unsure[at] * moved, found.level[at] + left, worth)
+    noise = 0.0 if comparisons.sampling is None else comparisons.sampling.of_margins(worth)
+    return Margins(values[at] * moved, unsure[at] * moved + noise, found.level[at] + left, worth)

@@ -137,6 +137,11 @@ class TabularMDP(TransitionTable):
     def __init__(self, P: Any, gamma: float, d0: Any, visits: Any = None):
         self.gamma: float = check_discount(gamma)
         super().__init__(P, d0, visits)
+        most = float(self.P.sum(axis=1).max(initial=0.0))
+        if self.gamma * most >= 1:
+            raise InvalidMDP(
+                f"gamma is {gamma} and a row of P sums to {most:.12g}: values would have no bound. Normalise the rows."
+            )
 
     def __reduce__(self) -> tuple:
         return type(self), (self.P, self.gamma, self.d0, self.visits)

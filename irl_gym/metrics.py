@@ -132,12 +132,12 @@ def ties(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: floa
 
 def ties_of(found: Optimum, left_open: float) -> Ties:
     """The ties of an optimum under a reward whose solver left differences of action values open up to `left_open`."""
-    low, high = found.gaps
+    gap, wide = found.gaps
     mdp, reward = found.table.mdp, found.table.reward
-    tied, open_ = (high <= found.level) | mdp.terminal[:, None], found.level + left_open
+    tied, open_ = (gap + wide <= found.level) | mdp.terminal[:, None], found.level + left_open
     if mdp.visits is not None:  # what the counts leave open between actions of the same successors
         open_ = open_ + not_told(mdp, found.policy, mdp.gamma * found.V + (reward.values if reward.on_states else 0.0))
-    return Ties(tied, (low <= open_) & ~tied)
+    return Ties(tied, (gap - wide <= open_) & ~tied)
 
 
 def optimal_actions(mdp: TabularMDP, reward: TabularReward | np.ndarray, *, tolerance: float | None = None) -> ActionSets:

@@ -77,13 +77,12 @@ def told_loss(optimal: bool | None, low: float, high: float | None, share: float
     if optimal and (share is None or not np.isfinite(share)):
         return "yes: all actions are tied"
     if optimal:
-        return f"yes: the best policy earns at most {high:.1e} more, {share:.1e} of what is at stake"
+        return f"yes: the best policy earns at most {high:.1e} more, {share:.1e} of what is at stake" if high else "yes"
     if optimal is None:
         most = f"{low:.3g} to {high:.3g} more" if known else f"at least {low:.3g} more, how much is not known"
-        where = "1 state where it was" if unknown == 1 else f"{unknown} states where it was"
-        return f"undecided: the best policy earns {most}" + (
-            f", by what the expert does in {where} not seen" if unknown else ""
-        )
+        where = "1 state" if unknown == 1 else f"{unknown} states"
+        free = f"; the expert may do anything in {where} where it was not seen" if unknown else ""
+        return f"undecided: the best policy earns {most}{free}"
     return f"no: the best policy earns at least {low:.3g} more"
 
 
@@ -112,8 +111,9 @@ def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) ->
     random = found.shortfall(np.full(expert.shape, 1 / expert.shape[1]), nowhere)
     gain = max(_sum(mdp.d0, random[0] - e, -1), 0.0), _sum(mdp.d0, random[1] + found.above, 1)
     span = _span(found, expert)
-    tied = bool(found.tied()[~mdp.terminal].all())
-    return Loss(max(low, 0.0), max(high, 0.0), min(gain[0], max(span[0], 0.0)), min(gain[1], span[1]), tied)
+    scale = min(gain[0], max(span[0], 0.0)), min(gain[1], span[1])
+    tied = bool(found.tied()[~mdp.terminal].all()) and not low > OPTIMAL_SHARE * scale[1]
+    return Loss(max(low, 0.0), max(high, 0.0), *scale, tied)
 
 
 def loss_on(table: TabularMDP, found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:

@@ -22,6 +22,9 @@ ACTIONS = 1
 NOISE = 2
 """The one that decides where an expert errs, since whoever errs may draw actions of the same seed."""
 
+ROUNDING = 1e-12
+"""A row of probabilities whose sum is farther from 1 than this is divided by it."""
+
 
 @runtime_checkable
 class Policy(Protocol):
@@ -96,7 +99,8 @@ def _checked_probabilities(array: np.ndarray) -> np.ndarray:
     wrong = np.flatnonzero(np.abs(sums - 1) > 1e-8)
     if wrong.size:
         raise InvalidPolicy(f"policy[s={wrong[0]}] sums to {sums[wrong[0]]:.9g}: each row must sum to 1. Normalise it.")
-    return array.astype(np.float64)
+    off = np.abs(sums - 1) > ROUNDING
+    return np.where(off[:, None], array / sums[:, None], array).astype(np.float64)
 
 
 def support(policy: Any, n_states: int, n_actions: int) -> ActionSets:

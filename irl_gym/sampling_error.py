@@ -22,7 +22,9 @@ counts leave it uncertain as well is not in the error of a margin, but in `value
 Axes: S states, A actions, n rows of (4).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -86,6 +88,15 @@ def counted_table(error: float | None) -> str:
     """What is judged on a counted table; with the error of its margins where that is known."""
     return "a counted table" + (
         "" if error is None else f", margins within {error:.2g} with 95 % confidence if later values are right"
+    )
+
+
+def estimated_table(table: Mapping[str, Any], reward: Mapping[str, Any]) -> str:
+    """What is judged in a run on a table that is not exact, by its records in metrics.json."""
+    return (
+        counted_table(reward.get("sampling_error"))
+        if table.get("counted")
+        else "a table that is an estimate, with errors unknown"
     )
 
 

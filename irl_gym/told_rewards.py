@@ -5,7 +5,7 @@ from typing import Any
 
 from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
-from irl_gym.sampling_error import counted_table
+from irl_gym.sampling_error import estimated_table
 from irl_gym.shares import MUCH
 
 ROUNDING = 1e-12
@@ -23,8 +23,9 @@ def told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> Ite
     judged = "; judged are the actions most frequent in its episodes" if seen else ""
     optimal = told_record(reward) or (best if reward["expert_optimal"] else _why_not(reward))
     yield "expert optimal under it", f"{optimal}{judged}"
-    if (metrics["table"] or {}).get("counted"):
-        yield "judged on", counted_table(reward.get("sampling_error"))
+    table = metrics["table"] or {}
+    if not table.get("exact", True):
+        yield "judged on", estimated_table(table, reward)
     if reward.get("unsettled_states"):
         told = "there a margin is within its sampling error, and may be noise. Try more steps to count."
         yield "states the counts leave open", f"{reward['unsettled_states']:,}: {told}"

@@ -58,13 +58,13 @@ def test_bounds_of_an_optimum_hold(seeds):
         mdp, reward, rng = hard_case(seed)
         found, exact = optimum(mdp, reward), ExactMDP(mdp, reward.values)
         V, Q = exact.optimum(found.policy)
-        W, (low, high) = exactly(found.W), found.gaps
+        W, (gap, wide) = exactly(found.W), found.gaps
         policy = rng.dirichlet(np.ones(mdp.n_actions), size=mdp.n_states)
         behind, unsure = found.behind(policy)
         for s, value in enumerate(exact.evaluate(policy)):
             assert abs(V[s] - W[s]) <= Fraction(found.error[s]), seed
             assert abs(W[s] - value - Fraction(behind[s])) <= Fraction(unsure[s]), seed
-            assert all(Fraction(low[s, a]) <= V[s] - Q[s][a] <= Fraction(high[s, a]) for a in range(mdp.n_actions)), seed
+            assert all(abs(V[s] - Q[s][a] - Fraction(gap[s, a])) <= Fraction(wide[s, a]) for a in range(mdp.n_actions)), seed
 
 
 @seeds

@@ -17,7 +17,7 @@ import numpy as np
 from irl_gym._typing import Indices, Matrix, Numbers, StateMask, Vector
 from irl_gym.checks import checked_number, checked_rng, float_array
 from irl_gym.comparisons import Comparisons, as_compared, compare
-from irl_gym.dynamic_programming import optimum, policy_iteration
+from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import InvalidParameter
 from irl_gym.howard import as_told
 from irl_gym.learners.feature_rows import completed
@@ -81,6 +81,8 @@ class Membership:
     """A violation up to this is none, beside the rounding of the table's numbers: what the solver of R left open."""
     undecided: int
     """Rows of (4) that neither hold nor are violated for certain."""
+    counted: bool
+    """Is the table an estimate from counts, whose noise may hide it?"""
     ties: int
     """States without a margin, of those that R could give one."""
     margin: Vector
@@ -98,8 +100,9 @@ class Membership:
         """The finding in a sentence or two."""
         finite = self.margin[np.isfinite(self.margin)]
         if self.member is None:
+            hides = "the noise of the counts" if self.counted else "rounding"
             return (
-                f"Undecided: no row of (4) is violated for certain, and rounding hides whether {self.undecided} of them hold; "
+                f"Undecided: no row of (4) is violated for certain, and {hides} hides whether {self.undecided} of them hold; "
                 f"the largest violation is {self.worst_violation:.3g}."
             )
         if not self.member:
@@ -161,7 +164,7 @@ def membership(
     usable = posed.movable(R.on_states)
     violations, held, violated = margins.violations(c.equal), margins.hold(c.equal), margins.violated(c.equal)
     behind, unsure = found.behind(c.distribution)
-    V, advantages = found.V - behind, np.mean(found.less_than(behind, unsure), axis=0)
+    V, advantages = found.V - behind, found.less_than(behind, unsure)[0]
     if R.on_states:  # V = R + gamma W, and Q likewise
         V, advantages = R.values + part.gamma * V, part.gamma * advantages
     advantages[part.terminal] = 0.0
@@ -176,6 +179,7 @@ def membership(
         worst_violation=float(violations.max(initial=0.0)),
         tolerance=tolerance,
         undecided=undecided,
+        counted=part.visits is not None,
         ties=np.unique(c.states[usable & (margins.values <= margins.none)]).size,
         violated_rows=np.stack([posed.rows[c.states[violated]], c.actions[violated]], axis=1).astype(np.int64),
         violations=violations[violated],
@@ -198,7 +202,7 @@ def _acting_best(posed: Posed, R: TabularReward) -> Posed:
     as_expert = TabularMDP(as_told(part, told, ~posed.known), part.gamma, part.d0)
     paid = R.expected(part)
     paid = np.where(posed.known[:, None], (told * paid).sum(axis=1, keepdims=True), paid)
-    best = policy_iteration(as_expert, paid).policy
+    best = optimum(as_expert, paid).policy
     distribution = np.where(posed.known[:, None], told, np.eye(part.n_actions)[best])
     return Posed(posed.rows, part, posed.known, compare(part, distribution, np.flatnonzero(posed.known)))
 

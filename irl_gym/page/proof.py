@@ -14,7 +14,7 @@ from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
 from irl_gym.runs import Run
-from irl_gym.sampling_error import counted_table
+from irl_gym.sampling_error import estimated_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged, returns_of
 
@@ -133,11 +133,12 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool 
 def _counted(run: Run) -> str:
     """What the verdict rests on, where the table is counted; nothing where it is exact."""
     reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
-    if not (run.metrics.get("table") or {}).get("counted"):
+    table = run.metrics.get("table") or {}
+    if table.get("exact", True):
         return ""
     n = reward.get("unsettled_states")
     left = f", and in {counted(n, 'state')} a margin is smaller than its error" if n else ""
-    return f" All this is judged on {counted_table(reward.get('sampling_error'))}{left}.{loss_told(agent)}"
+    return f" All this is judged on {estimated_table(table, reward)}{left}.{loss_told(agent)}"
 
 
 def certificate(run: Run) -> Section:
@@ -158,8 +159,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
     yield "Expert optimal under the reward", optimal
-    if (run.metrics.get("table") or {}).get("counted"):
-        yield "Judged on", counted_table(reward.get("sampling_error"))
+    if not (run.metrics.get("table") or {}).get("exact", True):
+        yield "Judged on", estimated_table(run.metrics["table"], reward)
     if held.get("degenerate"):
         yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
     margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)

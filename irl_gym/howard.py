@@ -25,7 +25,7 @@ from irl_gym.rewards import TabularReward
 TIED = 4 * EPSILON
 """What rounding makes of a sum, as a share of its terms: 1/3 + 1/3 + 1/3 need not be 1 in a table of float64."""
 CAREFUL = 1e-10
-"""Share of the terms, times 1 - gamma, up to which a policy takes an action for tied: a loss is paid at each of so many steps."""
+"""Share of the terms, times 1 - gamma, up to which a policy takes an action for tied: each of its many steps pays the loss."""
 WORTHWHILE = 1e-15
 """Share of the same terms below which nothing is improved."""
 LAST_IMPROVEMENTS = 30
@@ -137,8 +137,11 @@ class Optimum:
     def tied(self) -> ActionSets:
         """(S, A) the actions that a policy may take for the best: tied, and the closer the more steps pay for it."""
         gains = np.where(self.blocked, -np.inf, self.advantages.values)
-        careful = CAREFUL * (1 - self.table.mdp.gamma) * self.advantages.size
-        return gains >= gains.max(axis=1, keepdims=True) - np.minimum(self.level, careful)
+        best = gains.max(axis=1, keepdims=True)
+        near = gains >= best - CAREFUL * (1 - self.table.mdp.gamma) * self.advantages.size
+        if not (near.sum(axis=1) > 1)[~self.table.mdp.terminal].any():  # no need of a factorisation
+            return near
+        return near & (gains >= best - self.level)
 
     def bound(self, policy: Actions) -> float:
         """|W - V*| and V* - V_policy are at most this in every state: cheaper than `error`, and wider where R has outliers."""

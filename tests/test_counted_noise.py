@@ -179,7 +179,7 @@ def test_a_run_on_counts_says_what_its_agent_loses_at_most(tmp_path):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("steps", [20_000, 100_000])
 def test_no_run_is_falsely_healthy_and_each_loses_what_it_says(size, steps):
-    false, beyond, split, few = 0, 0, 0, 0
+    false, beyond, split, few, told = 0, 0, 0, 0, 0
     for seed in range(10):
         found, expert = counts(size, steps, seed)
         structural = compare(exact(*SIZES[size])[0], expert).trivial
@@ -191,7 +191,8 @@ def test_no_run_is_falsely_healthy_and_each_loses_what_it_says(size, steps):
             if result is None:
                 continue
             lost, said, _, _ = judged(size, result, found, seed)
+            told += 1
             beyond += lost > said.high
             false += diagnosis.healthy and lost > 3
     print(f"{size}, {steps}: {split} ties split, {few} of too few counts, {false} false healthy, {beyond} beyond what is said")
-    assert false == 0 and beyond == 0 and split <= 2
+    assert false == 0 and beyond == 0 and split <= 2 and told >= 10  # a reward on steps is always found

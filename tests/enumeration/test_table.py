@@ -115,6 +115,12 @@ def fickle():
     return env, table_of(env, revisits=0)
 
 
+@pytest.mark.slow
+def test_nothing_is_hidden_in_the_revealed_fickle_taxi(fickle):
+    env, table = fickle
+    assert np.array_equal(table_of(env).mdp.P.data, table.mdp.P.data)
+
+
 def test_enumeration_of_revealed_fickle_taxi_has_the_change_of_mind(fickle):
     """One row by hand: with the passenger aboard, a first move changes the destination to one of the other three."""
     env, table = fickle

@@ -4,9 +4,11 @@ Draws are enumerated where they can be, and probabilities are exact; else the ca
 own, and counted. Both are the same again whenever they are made again, by their *script*.
 """
 
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, TypeVar
 
 import gymnasium as gym
@@ -22,6 +24,8 @@ from irl_gym.errors import NotEnumerable
 
 REPLAYED = 50
 """Each so many calls, one outcome is made twice: a difference comes from outside the environment's generators."""
+MADE_AGAIN = 500
+"""Outcomes of a call that are made again to see who draws from a generator that is shared."""
 PULSE = 256
 """Runs of a call between two looks at the clock."""
 MOST_REFUSALS = 5
@@ -140,8 +144,9 @@ class Trials:
             self._watch.look(lambda: [self._made_again(call) for call in calls])
 
     def _made_again(self, call: Call) -> None:
+        """Once more the first outcomes of a call: enough to see who draws, where a reset has a hundred thousand."""
         with suppress(NotEnumerable):  # it is counted
-            self._enumerated(call, lambda _: None)
+            deque(islice(self.draws.outcomes(call), MADE_AGAIN), maxlen=0)
 
     def again(self, call: Call, row: int, script: Script) -> Result:
         """The outcome of a script."""

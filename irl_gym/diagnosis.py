@@ -108,12 +108,13 @@ def doctor(
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
         shaped,
-        weights=_weights(reward),
+        weights=weights_of(reward),
     )
     return diagnose(case)
 
 
-def _weights(reward: Any) -> np.ndarray | None:
+def weights_of(reward: Any) -> np.ndarray | None:
+    """(K,) alpha of a reward that is linear in features; None of another."""
     return reward.alpha if isinstance(reward, LinearReward) else None
 
 
@@ -166,7 +167,9 @@ def diagnose_run(run: "Run") -> Diagnosis:
     if table is None:
         stats = reward.get("stats", {})
         return diagnose(
-            Case(claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics, weights=_weights(run.learned))
+            Case(
+                claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics, weights=weights_of(run.learned)
+            )
         )
     case = Case(
         table.mdp,
@@ -178,7 +181,7 @@ def diagnose_run(run: "Run") -> Diagnosis:
         table.reward,
         bool(run.config.get("shaping")),
         run.metrics,
-        _weights(run.learned),
+        weights_of(run.learned),
     )
     return diagnose(case)
 

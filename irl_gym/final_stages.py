@@ -15,7 +15,7 @@ import numpy as np
 from irl_gym.ambiguity.lambda_path import lambda_path
 from irl_gym.ambiguity.widths import feasible_widths
 from irl_gym.diagnoses.case import Case
-from irl_gym.diagnosis import diagnose
+from irl_gym.diagnosis import diagnose, weights_of
 from irl_gym.errors import IrlGymError
 from irl_gym.figures import layout_of
 from irl_gym.filming import film
@@ -82,7 +82,10 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
 def _case(loop: "Loop") -> Case:
     """The evidence that the doctor works on, of a table or, without one, of the certificate alone."""
     made = loop.stage("reward")
-    without = Case(claims=loop.certificate, status=made["status"], stats=made["stats"], judged=loop.folder_metrics)
+    without = Case(
+        claims=loop.certificate, status=made["status"], stats=made["stats"], judged=loop.folder_metrics,
+        weights=weights_of(loop.learned),
+    )  # fmt: skip
     if not isinstance(loop.world, TableWorld):
         return without
     table = loop.world.table

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from irl_gym.choices import features_named
 from irl_gym.datasets import read_minari, write_minari
+from irl_gym.diagnosis import diagnose_run
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import DatasetMismatch, DatasetMissing, HiddenState, InvalidFeatures, NotDiscrete, NotTabular
 from irl_gym.experiment import Experiment
@@ -24,6 +25,7 @@ from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import FOR_CONTROL, SB3, ValueIteration
 from irl_gym.report import print_report
 from irl_gym.rollouts import run_episodes
+from irl_gym.runs import read_run
 
 LAKE_DATA, CAR_DATA, CART_DATA = (f"irl_gym/{name}-expert-v0" for name in ("frozenlake-v1", "mountaincar-v0", "cartpole-v1"))
 FEW = {"eval_episodes": 20, "retrain": ValueIteration()}
@@ -125,6 +127,12 @@ def test_the_metrics_have_the_documented_keys(runs, name):
     row = {"value", "score", "mean_return", "return_low", "return_high", "return_share", "agreement"}
     assert all(set(one) == row for one in metrics["policies"].values())
     assert (metrics["table"] is None) == (name in STEPPED) and metrics["demonstrations"]["given"] == (name in DATA)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_tells_what_the_doctor_finds_in_its_folder(runs, name):
+    told = json.loads((runs(name).out / "diagnosis.json").read_text())
+    assert [one["name"] for one in told["findings"]] == list(diagnose_run(read_run(runs(name).out)).names)
 
 
 @pytest.mark.parametrize("name", NAMES)

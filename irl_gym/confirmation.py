@@ -91,7 +91,7 @@ def _discounted(table: Tabulation, episodes: Sequence[Episode]) -> tuple[np.ndar
 
 
 def loss_told(row: Mapping[str, Any]) -> str:
-    """What a policy loses at most against the best possible, by its row of metrics.json; nothing where nobody asked."""
+    """What a policy loses at most against the table's best, by its row of metrics.json; nothing where nobody asked."""
     if "loses_at_most" not in row:
         return ""
     most = row["loses_at_most"]

@@ -135,6 +135,8 @@ class Learning:
     """trajectory-lp. auto lets no policy that is far worse than the expert outweigh the others."""
     inner: Annotated[PlannerName | None, UNSET] = None
     """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
+    time_limit: Annotated[float | None, UNSET] = None
+    """Seconds for all linear programs of the learner together; the default is no limit."""
 
     @property
     def cap(self) -> float | Literal["auto"] | None:
@@ -146,17 +148,20 @@ class Learning:
         slack = 1.0 if from_episodes and self.reward_on == "state" else None
         if self.slack != "auto":
             slack = None if self.slack == "none" else self.slack
-        return FiniteLP(l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack)
+        return FiniteLP(
+            l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack,
+            time_limit=self.time_limit,
+        )  # fmt: skip
 
     def linear(self, env: gym.Env, control: bool, seed: int) -> FeatureLP | TrajectoryLP:
         """The learner of section 4 or 5."""
         phi = features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
         l1: Any = self.l1
         if self.learner == "feature-lp":
-            return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed)
+            return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed, time_limit=self.time_limit)
         rounds = self.rounds if self.rounds is not None else 8 if control else 30
         gap_cap = "auto" if self.gap_cap == "auto" else None
-        return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed)
+        return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed, time_limit=self.time_limit)
 
 
 @dataclass(frozen=True)

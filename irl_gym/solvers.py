@@ -2,24 +2,29 @@
 
 HiGHS (simplex) answers small programs with a vertex, exact to rounding; Clarabel (interior point) is the faster on large
 sparse ones: Ng & Russell's program on a 50x50 grid (gamma 0.99) took HiGHS 9.8 s and Clarabel 0.4 s. Clarabel factorises by
-qdldl: its own choice, faer, took six times as long on a 100x100 grid. When one solver fails the other is tried once.
+qdldl: its own choice, faer, took six times as long on a 100x100 grid. When one solver fails the other is tried once, never
+without a limit. All programs of a fit, and all attempts, share one limit of time: a solver has what those before it left. It
+looks at the clock between its iterations, and on a sparse table one is short; where factors fill up (10,000 states whose
+successors are drawn at random) one can take minutes.
 """
 
 import enum
 import time
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import cvxpy as cp
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.deadline import NEVER, Deadline
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
 SolverName = Literal["auto", "clarabel", "highs"]
 SMALL = 1_500
 """Rows up to which HiGHS is chosen."""
+SECOND_SECONDS, SECOND_SHARE = 60.0, 10.0
+"""A second attempt without a time limit ends after so many seconds, or so many times what the first took, whichever is more."""
 
 
 class Status(enum.Enum):
@@ -89,69 +94,109 @@ _SOLVERS = {
 _OTHER = {"clarabel": "highs", "highs": "clarabel"}
 
 
+@dataclass(frozen=True)
+class Solving:
+    """How the programs of one fit are solved, and until when."""
+
+    solver: SolverName = "auto"
+    """"auto" chooses by size; a named solver is tried first, and the other after it."""
+    deadline: Deadline = field(default=NEVER)
+    """Of all of them together."""
+
+    @classmethod
+    def begun(cls, solver: SolverName, time_limit: float | None) -> "Solving":
+        """The clock of a fit starts now.
+
+        Args:
+            solver: its name.
+            time_limit: seconds for all programs and attempts together; None for no limit.
+
+        Raises:
+            InvalidParameter: an unknown solver name, or a time limit that is not positive.
+        """
+        if solver not in ("auto", *_SOLVERS):
+            raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
+        return cls(solver, Deadline.after(time_limit))
+
+    def late(self, reasons: str) -> SolverTimeout:
+        """The error of a fit whose time is up."""
+        return SolverTimeout(
+            f"no answer in {self.deadline.seconds} s, which all programs of a fit have together ({reasons}): raise time_limit, "
+            "or choose the other solver."
+        )
+
+
+AUTO = Solving()
+"""By size, without a limit."""
+
+
 def check_solving(solver: Any, time_limit: Any) -> None:
-    """Check what `solve` takes, before anything is built.
+    """Check a learner's fields, before anything is built.
 
     Raises:
         InvalidParameter: an unknown solver name, or a time limit that is not positive.
     """
-    if solver not in ("auto", *_SOLVERS):
-        raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
-    if time_limit is not None:
-        checked_number("time_limit", time_limit, "seconds above 0, or None", above=0)
+    Solving.begun(solver, time_limit)
 
 
-def solve(problem: cp.Problem, *, rows: int, solver: SolverName = "auto", time_limit: float | None = None) -> Answer:
+def solve(problem: cp.Problem, *, rows: int, solving: Solving = AUTO) -> Answer:
     """Solve a linear program; on failure retry once with the other solver.
 
     Args:
         problem: a cvxpy problem; its variables and constraints hold the answer and the duals afterwards.
         rows: its number of constraint rows, by which "auto" chooses.
-        solver: "auto", "clarabel" or "highs"; a named solver is tried first and the other after it.
-        time_limit: seconds for each attempt.
+        solving: with which solver, and until when.
 
     Raises:
-        InvalidParameter: an unknown solver name, or a time limit that is not positive.
         SolverTimeout: the time limit was reached.
         SolverInfeasible: the constraints contradict each other.
         SolverFailed: unbounded, or no solver gave an answer.
     """
-    check_solving(solver, time_limit)
-    first = ("highs" if rows <= SMALL else "clarabel") if solver == "auto" else solver
-    start = time.perf_counter()
+    first = ("highs" if rows <= SMALL else "clarabel") if solving.solver == "auto" else solving.solver
+    start, deadline = time.perf_counter(), solving.deadline
     failures: list[str] = []
     for attempt, name in enumerate((first, _OTHER[first]), start=1):
-        failure = _attempt(problem, name, time_limit)
+        failure = _attempt(problem, name, deadline)
+        seconds = time.perf_counter() - start
         if failure is None:
             status = Status.OPTIMAL if problem.status == cp.OPTIMAL else Status.INACCURATE
             stats = problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats is not None else 0
-            return Answer(status, name, time.perf_counter() - start, float(np.asarray(problem.value)), iterations, attempt)
+            return Answer(status, name, seconds, float(np.asarray(problem.value)), iterations, attempt)
         if problem.status == cp.INFEASIBLE:
             raise SolverInfeasible(f"{name} finds that the constraints contradict each other: no reward satisfies them.")
         failures.append(f"{name}: {failure}")
+        if not deadline.left:
+            break
+        if deadline is NEVER:
+            deadline = Deadline.after(max(SECOND_SECONDS, SECOND_SHARE * seconds))
     reasons = "; ".join(failures)
-    if "time limit" in reasons and "unbounded" not in reasons:
-        raise SolverTimeout(f"no answer in {time_limit} s ({reasons}): raise time_limit, or choose the other solver.")
-    raise SolverFailed(f"no solver gave an answer ({reasons}): rescale the problem, or report it with its table.")
+    if not solving.deadline.left:
+        raise solving.late(reasons)
+    longer = " Give time_limit, for the second to have longer." if not deadline.left else ""
+    raise SolverFailed(f"no solver gave an answer ({reasons}): rescale the problem, or report it with its table.{longer}")
 
 
-def _attempt(problem: cp.Problem, name: str, time_limit: float | None) -> str | None:
-    """Solve with one solver; return None, or what went wrong."""
-    chosen = _SOLVERS[name]
-    options = dict(chosen.options)
-    if time_limit is not None:
-        options[chosen.time_option] = time_limit
+def _attempt(problem: cp.Problem, name: str, deadline: Deadline) -> str | None:
+    """Solve with one solver in the time that is left; return None, or what went wrong."""
+    chosen, late = _SOLVERS[name], f"time limit of {deadline.seconds} s"
+    if not deadline.left:
+        return late
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an inaccurate answer is a Status, not a warning
-            problem.solve(solver=chosen.cvxpy_name, **options)
+            compiled: Any = problem.get_problem_data(chosen.cvxpy_name, solver_opts=chosen.options)
+            data, chain, inverse = compiled
+            left = deadline.left  # what compiling has left of it
+            if not left:
+                return late
+            options = chosen.options | ({} if deadline is NEVER else {chosen.time_option: left})
+            problem.unpack_results(chain.solve_via_data(problem, data, solver_opts=options), chain, inverse)
     except (cp.SolverError, ValueError) as error:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
-        timed_out = time_limit is not None and problem.status in (cp.USER_LIMIT, None)
-        return f"time limit ({text})" if timed_out and "limit" in text.lower() else text
+        return text if deadline.left else f"{late} ({text})"
     if problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
         return None
-    if problem.status == cp.USER_LIMIT or problem.status == "user_limit":
-        return f"time limit of {time_limit} s" if time_limit is not None else "iteration limit"
+    if problem.status == cp.USER_LIMIT:
+        return "iteration limit" if deadline.left else late
     return str(problem.status)

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import Sparse
+from irl_gym.deadline import NEVER, Deadline
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
 TOLERANCE = 1e-9
@@ -46,7 +47,7 @@ class WarmLP:
         high: (m,) largest values of the rows.
         least: (n,) least values of the variables.
         most: (n,) largest values of the variables.
-        time_limit: seconds for each solve; None for no limit.
+        deadline: of all solves, together with whatever else it is given to.
         perturbed: HiGHS may shift costs and bounds a little on its way, which gets it anywhere; what is left of the shifts can
             make an answer slightly worse.
 
@@ -62,7 +63,7 @@ class WarmLP:
         least: np.ndarray,
         most: np.ndarray,
         *,
-        time_limit: float | None = None,
+        deadline: Deadline = NEVER,
         perturbed: bool = True,
     ):
         rows, columns = A.shape
@@ -76,7 +77,7 @@ class WarmLP:
         lp.a_matrix_.start_, lp.a_matrix_.index_ = by_column.indptr, by_column.indices
         lp.a_matrix_.value_ = by_column.data
         self.columns = np.arange(columns, dtype=np.int32)
-        self.time_limit = time_limit
+        self.deadline = deadline
         self.highs = highspy.Highs()
         options: dict[str, Any] = {
             "output_flag": False, "threads": 1, "presolve": "off", "solver": "simplex", "simplex_strategy": PRIMAL_SIMPLEX,
@@ -104,12 +105,10 @@ class WarmLP:
         if cost.shape != self.columns.shape or not np.isfinite(cost).all():
             raise InvalidParameter(f"cost has shape {cost.shape}: expected {self.columns.size} finite numbers, one a variable.")
         self.highs.changeColsCost(cost.size, self.columns, cost)
-        if self.time_limit is not None:
-            self.highs.setOptionValue("time_limit", self.highs.getRunTime() + self.time_limit)
-        self.highs.run()
+        self._run()
         if self.highs.getModelStatus() == highspy.HighsModelStatus.kUnknown:  # lost on its way: again, from nothing
             self.highs.clearSolver()
-            self.highs.run()
+            self._run()
         self._check(self.highs.getModelStatus())
         solution = self.highs.getSolution()
         x = np.array(solution.col_value)
@@ -125,6 +124,11 @@ class WarmLP:
         """Begin the next solve where the last one of another program of the same rows and columns ended."""
         self.highs.setBasis(other.highs.getBasis())
 
+    def _run(self) -> None:
+        if self.deadline is not NEVER:
+            self.highs.setOptionValue("time_limit", self.highs.getRunTime() + self.deadline.left)
+        self.highs.run()
+
     def _check(self, status: Any) -> None:
         kinds = highspy.HighsModelStatus
         if status == kinds.kOptimal:
@@ -132,7 +136,10 @@ class WarmLP:
         if status == kinds.kInfeasible:
             raise SolverInfeasible("the linear program's constraints contradict each other: expected at least one point.")
         if status == kinds.kTimeLimit:
-            raise SolverTimeout(f"HiGHS stopped after {self.time_limit} s: raise time_limit, or give a smaller problem.")
+            raise SolverTimeout(
+                f"no answer in {self.deadline.seconds} s, which all linear programs have together: raise time_limit, or give a "
+                "smaller problem."
+            )
         raise SolverFailed(f"HiGHS ended with {self.highs.modelStatusToString(status)!r}: expected an optimum.")
 
 

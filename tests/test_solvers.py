@@ -1,12 +1,19 @@
+import time
+from functools import partial
+
 import cvxpy as cp
+import gymnasium as gym
 import models
 import numpy as np
 import pytest
 
-from irl_gym import solvers
+from irl_gym import deadline, solvers
+from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
+from irl_gym.features import OneHot
+from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
-from irl_gym.solvers import Status, solve
+from irl_gym.solvers import Solving, Status, solve
 
 both = pytest.mark.parametrize("solver", ["clarabel", "highs"])
 
@@ -29,7 +36,7 @@ def unbounded():
 
 @both
 def test_solve_finds_the_optimum(solver):
-    answer = solve(diet(), rows=2, solver=solver)
+    answer = solve(diet(), rows=2, solving=Solving(solver))
     assert (answer.solver, answer.status, answer.attempts) == (solver, Status.OPTIMAL, 1)
     assert answer.objective == pytest.approx(2.8, abs=1e-7)
 
@@ -37,7 +44,7 @@ def test_solve_finds_the_optimum(solver):
 @both
 def test_solve_leaves_values_in_the_variables(solver):
     problem = diet()
-    solve(problem, rows=2, solver=solver)
+    solve(problem, rows=2, solving=Solving(solver))
     np.testing.assert_allclose(problem.variables()[0].value, [1.2, 1.6], atol=1e-6)
 
 
@@ -58,20 +65,20 @@ def test_solve_tries_the_other_solver_when_the_first_gives_up(solver, monkeypatc
     hobbled = {"clarabel": {"max_iter": 1}, "highs": {"simplex_iteration_limit": 0, "presolve": "off"}}[solver]
     for name, value in hobbled.items():
         monkeypatch.setitem(solvers._SOLVERS[solver].options, name, value)
-    answer = solve(diet(), rows=2, solver=solver)
+    answer = solve(diet(), rows=2, solving=Solving(solver))
     assert (answer.solver != solver, answer.attempts) == (True, 2)
 
 
 @both
 def test_solve_says_that_a_program_is_unbounded(solver):
     with pytest.raises(SolverFailed, match=f"{solver}: unbounded"):
-        solve(unbounded(), rows=2, solver=solver)
+        solve(unbounded(), rows=2, solving=Solving(solver))
 
 
 @both
 def test_solve_takes_infeasible_for_an_answer(solver):
     with pytest.raises(SolverInfeasible, match=f"{solver} finds that the constraints contradict each other"):
-        solve(infeasible(), rows=2, solver=solver)
+        solve(infeasible(), rows=2, solving=Solving(solver))
 
 
 @both
@@ -84,23 +91,75 @@ def test_solve_stops_when_its_time_is_up(solver):
 
 def test_solve_does_not_call_an_infeasible_program_slow():
     with pytest.raises(SolverInfeasible, match="contradict"):
-        solve(infeasible(), rows=2, time_limit=60.0)
+        solve(infeasible(), rows=2, solving=Solving.begun("auto", 60.0))
 
 
 @both
 def test_solve_answers_within_a_generous_time_limit(solver):
-    assert solve(diet(), rows=2, solver=solver, time_limit=60.0).objective == pytest.approx(2.8)
+    assert solve(diet(), rows=2, solving=Solving.begun(solver, 60.0)).objective == pytest.approx(2.8)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock on which a second passes whenever a solver is asked, and never else."""
+    now, attempt = [0.0], solvers._attempt
+
+    def asked(*args):
+        now[0] += 1
+        return attempt(*args)
+
+    monkeypatch.setattr(deadline.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(solvers, "_attempt", asked)
+    return now
+
+
+@pytest.mark.parametrize("learner", [FiniteLP, partial(FiniteLP, slack=5.0), partial(FeatureLP, OneHot(30), margin_cap="auto")])
+def test_programs_of_a_fit_share_its_time(learner, clock):
+    model = models.random_model(1, S=30, A=3)
+    start = clock[0]
+    learner().fit(model.mdp, model.expert)
+    needed = clock[0] - start
+    assert needed >= 2
+    learner(time_limit=needed + 0.5).fit(model.mdp, model.expert)
+    with pytest.raises(SolverTimeout, match="which all programs of a fit have together"):
+        learner(time_limit=needed - 0.5).fit(model.mdp, model.expert)
+
+
+@both
+def test_a_second_attempt_is_never_without_a_limit(solver, monkeypatch):
+    hobbled = {"clarabel": {"max_iter": 1}, "highs": {"simplex_iteration_limit": 0, "presolve": "off"}}[solver]
+    for name, value in hobbled.items():
+        monkeypatch.setitem(solvers._SOLVERS[solver].options, name, value)
+    monkeypatch.setattr(solvers, "SECOND_SECONDS", 1e-9)
+    monkeypatch.setattr(solvers, "SECOND_SHARE", 1e-9)
+    with pytest.raises(SolverFailed, match="Give time_limit, for the second to have longer"):
+        solve(diet(), rows=2, solving=Solving(solver))
+    assert solve(diet(), rows=2, solving=Solving.begun(solver, 600.0)).attempts == 2  # the mend that it names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("learner", [FiniteLP, partial(FiniteLP, slack=5.0), partial(FiniteLP, reward_on="state-action")])
+@pytest.mark.parametrize(("size", "limit"), [(100, 2.0), (200, 10.0)])
+def test_a_time_limit_is_kept_within_a_fifth_on_a_grid(learner, size, limit):
+    """10,000 and 40,000 states, limits that are reached; wall time, so it is a bar."""
+    env = gym.make("irl_gym_envs:irl_gym/GridWorld-v0", size=size).unwrapped
+    mdp = env.mdp(0.99)
+    expert = policy_iteration(mdp, env.reward.expected(mdp)).policy
+    start = time.perf_counter()
+    with pytest.raises(SolverTimeout):
+        learner(time_limit=limit).fit(mdp, expert)
+    assert time.perf_counter() - start < 1.2 * limit
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
 def test_solve_refuses_a_time_limit_that_is_not_positive(limit):
     with pytest.raises(InvalidParameter, match=f"time_limit is {limit}"):
-        solve(diet(), rows=2, time_limit=limit)
+        Solving.begun("auto", limit)
 
 
 def test_solve_refuses_an_unknown_solver(unchecked):
     with pytest.raises(InvalidParameter, match="solver is 'simplex'"):
-        solve(diet(), rows=2, solver="simplex")
+        Solving.begun("simplex", None)
 
 
 @pytest.mark.parametrize("status", Status)

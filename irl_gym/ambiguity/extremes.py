@@ -14,6 +14,7 @@ import numpy as np
 
 from irl_gym._typing import Sparse
 from irl_gym.checks import checked_number
+from irl_gym.deadline import NEVER, Deadline
 from irl_gym.warm_lp import WarmLP
 
 CHUNK = 100
@@ -35,9 +36,9 @@ class Polytope:
     most: np.ndarray
     """(n,) largest values of the unknowns."""
 
-    def program(self, time_limit: float | None = None, *, perturbed: bool = True) -> WarmLP:
+    def program(self, deadline: Deadline = NEVER, *, perturbed: bool = True) -> WarmLP:
         """The linear program whose objective may change."""
-        return WarmLP(self.A, self.low, self.high, self.least, self.most, time_limit=time_limit, perturbed=perturbed)
+        return WarmLP(self.A, self.low, self.high, self.least, self.most, deadline=deadline, perturbed=perturbed)
 
 
 def extremes(
@@ -46,7 +47,7 @@ def extremes(
     *,
     lowest: np.ndarray | None = None,
     workers: int = 1,
-    time_limit: float | None = None,
+    deadline: Deadline = NEVER,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The least and the largest value of each function.
 
@@ -56,7 +57,7 @@ def extremes(
         lowest: (k,) booleans: functions whose least value is wanted too; the others' is NaN. None for all.
         workers: processes. More than one are started afresh ("spawn"), so a script that asks for them needs the usual
             `if __name__ == "__main__":`.
-        time_limit: seconds for each linear program.
+        deadline: of all linear programs together.
 
     Returns:
         (k,) least and (k,) largest values.
@@ -70,7 +71,7 @@ def extremes(
     count = functions.shape[0]
     lowest = np.ones(count, dtype=bool) if lowest is None else lowest
     chunks = [(functions[at : at + CHUNK], lowest[at : at + CHUNK]) for at in range(0, count, CHUNK)]
-    solve = partial(_chunk, polytope, time_limit)
+    solve = partial(_chunk, polytope, deadline)
     if workers == 1 or len(chunks) < 2:
         found = list(map(solve, chunks))
     else:
@@ -81,10 +82,10 @@ def extremes(
     return joined[:, 0], joined[:, 1]
 
 
-def _chunk(polytope: Polytope, time_limit: float | None, chunk: tuple[Sparse, np.ndarray]) -> np.ndarray:
+def _chunk(polytope: Polytope, deadline: Deadline, chunk: tuple[Sparse, np.ndarray]) -> np.ndarray:
     """(c, 2) least and largest values of a chunk's functions."""
     functions, lowest = chunk
-    program, dense = polytope.program(time_limit), functions.toarray()
+    program, dense = polytope.program(deadline), functions.toarray()
     found = np.full((dense.shape[0], 2), np.nan)
     for i, function in enumerate(dense):
         if lowest[i]:

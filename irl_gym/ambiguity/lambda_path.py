@@ -24,6 +24,7 @@ from irl_gym.ambiguity.path_changes import Change, changes
 from irl_gym.ambiguity.priced import PricedProgram
 from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
+from irl_gym.deadline import Deadline
 from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
@@ -190,7 +191,7 @@ def lambda_path(
         margin_cap: None for the paper's program; the cap on margins; or "auto", FiniteLP's own, for the same expert.
         reward_on: "state" for R(s), "state-action" for R(s, a).
         most_pieces: pieces at most, at least 2: those that bring the path nearest to f first. None for all.
-        time_limit: seconds for the whole path, but for the cap and the rows that can have a margin.
+        time_limit: seconds for all linear programs together; those that choose the cap have as many.
 
     Raises:
         InvalidMDP: mdp is no TabularMDP.
@@ -205,8 +206,8 @@ def lambda_path(
     expert = _known(checked_mdp(mdp), expert)
     served, cap = (None, None) if margin_cap is None else served_actions(learner, mdp, expert)
     cap = cap if margin_cap == "auto" else margin_cap
-    on_states = reward_on == "state"
-    program = PricedProgram(mdp, expert, r_max=r_max, cap=cap, on_states=on_states, served=served, time_limit=time_limit)
+    on_states, deadline = reward_on == "state", Deadline.after(time_limit)
+    program = PricedProgram(mdp, expert, r_max=r_max, cap=cap, on_states=on_states, served=served, deadline=deadline)
     nothing = NO_MARGIN * min(r_max, np.inf if cap is None else cap)
     found = envelope(program.at, most_pieces, nothing) if program.states.size else None
     if found is None or found.breakpoints[-1] <= NO_MARGIN:

@@ -6,7 +6,6 @@ margins by `row_margins`, and Lagrange's bound above the optimum from the progra
 Axes: S states, A actions, n rows of (4), q rewards (S or S*A).
 """
 
-import time
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from irl_gym._typing import ActionSets
 from irl_gym.ambiguity.envelope import Line
 from irl_gym.ambiguity.priced_rewards import PricedRewards
 from irl_gym.comparisons import compare
+from irl_gym.deadline import NEVER, Deadline
 from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
 from irl_gym.errors import SolverFailed, SolverTimeout
@@ -42,7 +42,7 @@ class PricedProgram:
         r_max: bound on |R|.
         cap: the cap on margins; None is the paper's program, in which a row of equal successors takes its state's margin.
         on_states: R(s), or R(s, a).
-        time_limit: seconds for all solves together; None for no limit.
+        deadline: of all solves together.
         served: (S, A) actions whose rows can be strict; the other rows count towards no margin. None for all.
     """
 
@@ -54,11 +54,11 @@ class PricedProgram:
         r_max: float,
         cap: float | None,
         on_states: bool,
-        time_limit: float | None,
+        deadline: Deadline = NEVER,
         served: ActionSets | None = None,
     ):
         self.whole, self.r_max, self.cap, self.on_states = mdp, r_max, cap, on_states
-        self.until, self.time_limit = time.monotonic() + (time_limit or np.inf), time_limit
+        self.deadline = deadline
         self.rows = np.flatnonzero(mdp.reachable)
         self.part = part = mdp.restrict(self.rows)
         self.comparisons = c = compare(part, np.asarray(expert)[self.rows])
@@ -76,7 +76,7 @@ class PricedProgram:
     def _program(self, *, perturbed: bool = False) -> WarmLP:
         """The constraints, in the program's unit."""
         most = np.inf if self.cap is None else self.cap / self.unit
-        return self.program.polytope(self.r_max / self.unit, 0.0, most).program(perturbed=perturbed)
+        return self.program.polytope(self.r_max / self.unit, 0.0, most).program(self.deadline, perturbed=perturbed)
 
     def at(self, price: float) -> tuple[Line, float]:
         """An optimal reward at a price, and Lagrange's bound above the optimum.
@@ -85,11 +85,8 @@ class PricedProgram:
             SolverTimeout: the time limit was reached.
             SolverFailed: no answer.
         """
-        if self.time_limit is not None:
-            left = self.until - time.monotonic()
-            if left <= 0:
-                raise self._late()
-            self.lp.time_limit = left
+        if not self.deadline.left:
+            raise self._late()
         cost = PRICED * self.program.cost(1.0, price)
         line, bound, off = self._answer(self._solved(cost), price)
         if off > ACCURATE:  # once more, from nothing: the simplex method says "optimal" of a basis that has become inexact
@@ -119,7 +116,6 @@ class PricedProgram:
     def _afresh(self, cost: np.ndarray) -> Vertex:
         """The optimum from scratch: with perturbations, which get anywhere, and then from their basis without."""
         rough, exact = self._program(perturbed=True), self._program()
-        rough.time_limit = exact.time_limit = self.lp.time_limit
         self.lp = exact
         try:
             vertex = rough.minimise(cost)
@@ -133,7 +129,7 @@ class PricedProgram:
             raise self._late() from None
 
     def _late(self) -> SolverTimeout:
-        return SolverTimeout(f"the path was not finished in {self.time_limit} s: raise time_limit, or give most_pieces.")
+        return SolverTimeout(f"the path was not finished in {self.deadline.seconds} s: raise time_limit, or give most_pieces.")
 
     def line(self, R: np.ndarray) -> Line:
         """What a reward (q,), in the program's unit, is worth, and its largest violation of (4): from P and the expert."""

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from irl_gym._typing import Sparse
 from irl_gym.ambiguity.extremes import Polytope, extremes
 from irl_gym.ambiguity.feasible import Posed
+from irl_gym.deadline import Deadline
 from irl_gym.learners.programs import picking
 from irl_gym.warm_lp import WarmLP
 
@@ -46,10 +47,10 @@ class RewardSet(ABC):
         """The set."""
 
     @abstractmethod
-    def bounds(self, tau: float, workers: int, time_limit: float | None) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
         """Least and largest reward, (S,) or (S, A), and how many linear programs it took."""
 
-    def largest_margin(self, time_limit: float | None) -> float:
+    def largest_margin(self, deadline: Deadline) -> float:
         """The largest tau at which the set is not empty.
 
         Raises:
@@ -59,7 +60,7 @@ class RewardSet(ABC):
         column = sp.csr_array(-self.counted[:, None].astype(np.float64))
         A = sp.csr_array(sp.hstack([bare.A, column]))
         least, most = np.append(bare.least, 0.0), np.append(bare.most, np.inf)
-        program = WarmLP(A, bare.low, bare.high, least, most, time_limit=time_limit)
+        program = WarmLP(A, bare.low, bare.high, least, most, deadline=deadline)
         return float(program.minimise(np.append(np.zeros(bare.least.size), -1.0)).x[-1])
 
 
@@ -100,14 +101,14 @@ class StateRewards(RewardSet):
             np.concatenate([value, most_u]),
         )
 
-    def bounds(self, tau: float, workers: int, time_limit: float | None) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
         """Where the expert is not known the largest u, and the least of V(s) - gamma P_a(s) V over V and a."""
         k, n = self.opened.size, self.closed.size
         on_V = sp.vstack([self.here, sp.csr_array((k, self.n_states)), -self.each])
         on_u = sp.vstack([sp.csr_array((n, k)), sp.eye_array(k), sp.csr_array((self.each.shape[0], k))])
         functions: Sparse = sp.csr_array(sp.hstack([on_V, on_u]))
         both = np.arange(functions.shape[0]) < n
-        least, most = extremes(self.polytope(tau), functions, lowest=both, workers=workers, time_limit=time_limit)
+        least, most = extremes(self.polytope(tau), functions, lowest=both, workers=workers, deadline=deadline)
         low, high = np.zeros(self.n_states), np.zeros(self.n_states)
         low[self.closed], high[self.closed], high[self.opened] = least[:n], most[:n], most[n : n + k]
         low[self.opened] = (-most[n + k :]).reshape(k, self.n_actions).min(axis=1)
@@ -142,9 +143,9 @@ class StepRewards(RewardSet):
         low = self._pinned(-1.0) + np.where(self.counted, tau, 0.0)
         return Polytope(self.A, low, np.where(self.taken, self._pinned(1.0), np.inf), -value, value)
 
-    def bounds(self, tau: float, workers: int, time_limit: float | None) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
         """An action that the expert does not take can have any reward from -1 to what keeps it worse by tau."""
-        least, most = extremes(self.polytope(tau), self.A, lowest=self.taken, workers=workers, time_limit=time_limit)
+        least, most = extremes(self.polytope(tau), self.A, lowest=self.taken, workers=workers, deadline=deadline)
         low = np.where(self.taken, least, self._pinned(-1.0))
         high = np.where(self.taken, most, np.minimum(most - np.where(self.counted, tau, 0.0), self._pinned(1.0)))
         found = np.full((2, self.shape[0] * self.shape[1]), np.nan)

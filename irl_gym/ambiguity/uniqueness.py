@@ -21,6 +21,7 @@ from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.ambiguity.priced_rewards import PricedRewards
 from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
+from irl_gym.deadline import Deadline
 from irl_gym.errors import DegenerateExpert, InvalidParameter
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import JUST_BELOW
@@ -133,10 +134,11 @@ def optimal_face(
     r_max, top = learner.r_max, np.inf if cap is None else cap / learner.r_max
     program = PricedRewards(posed.part, posed.comparisons, on_states=learner.reward_on == "state", counted=counted)
     polytope = program.polytope(1.0, top if sparsest else 0.0, top)
-    vertex = polytope.program(learner.time_limit).minimise(program.cost(0.0, 1.0) if sparsest else program.cost(1.0, l1))
+    deadline = Deadline.after(learner.time_limit)
+    vertex = polytope.program(deadline).minimise(program.cost(0.0, 1.0) if sparsest else program.cost(1.0, l1))
     asked = np.flatnonzero(polytope.most[-program.size :] > 0)  # no step is taken in a terminal state
     face = _kept(polytope, vertex, tolerance)
-    least, most = extremes(face, program.picked[asked], workers=workers, time_limit=learner.time_limit)
+    least, most = extremes(face, program.picked[asked], workers=workers, deadline=deadline)
     low, high = (np.full(program.size, np.nan) for _ in range(2))
     low[asked], high[asked] = r_max * least, r_max * np.maximum(least, most)
     shape = (-1,) if program.on_states else (-1, mdp.n_actions)

@@ -27,6 +27,7 @@ from irl_gym._typing import ActionSets, Indices
 from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.ambiguity.reward_sets import RewardSet, StateRewards, StepRewards
 from irl_gym.checks import checked_number
+from irl_gym.deadline import Deadline
 from irl_gym.errors import InvalidParameter, SolverInfeasible
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
@@ -109,7 +110,7 @@ def feasible_widths(
         pinned: rewards that are known: state -> value, or (state, action) -> value.
         workers: processes; the same bytes with any number. More than one are spawned, so a script needs the usual
             `if __name__ == "__main__":`.
-        time_limit: seconds for each linear program.
+        time_limit: seconds for all linear programs together; those that choose the cap have as many.
 
     Raises:
         InvalidMDP, InvalidPolicy: not a TabularMDP, or an expert of the wrong shape or content.
@@ -127,14 +128,14 @@ def feasible_widths(
     served, tau = np.zeros((mdp.n_states, mdp.n_actions), dtype=bool), 0.0
     if margin:
         served, tau = served_actions(learner, mdp, expert)
-    with_margin = np.flatnonzero(served.any(axis=1))
+    deadline, with_margin = Deadline.after(time_limit), np.flatnonzero(served.any(axis=1))
     the_set = kind(posed, served[posed.rows], pins)
     if margin == "auto" and pins:
-        tau = _half_of_largest(the_set, pinned, r_max, time_limit)
+        tau = _half_of_largest(the_set, pinned, r_max, deadline)
     elif margin and margin != "auto":
         tau = margin
-    unknowns, rows = _checked_size(the_set, pinned, tau, r_max, time_limit)
-    low, high, solved = the_set.bounds(tau / r_max, workers, time_limit)
+    unknowns, rows = _checked_size(the_set, pinned, tau, r_max, deadline)
+    low, high, solved = the_set.bounds(tau / r_max, workers, deadline)
     return Widths(
         low=over_all_states(posed, mdp, r_max * low),
         high=over_all_states(posed, mdp, r_max * high),
@@ -159,10 +160,10 @@ def served_actions(learner: FiniteLP, mdp: TabularMDP, expert: Any) -> tuple[Act
     return certificate.served(mdp.n_actions), certificate.margin_cap or 0.0
 
 
-def _half_of_largest(the_set: RewardSet, pinned: Any, r_max: float, time_limit: float | None) -> float:
+def _half_of_largest(the_set: RewardSet, pinned: Any, r_max: float, deadline: Deadline) -> float:
     """tau, given the pins."""
     try:
-        largest = the_set.largest_margin(time_limit)
+        largest = the_set.largest_margin(deadline)
     except SolverInfeasible as reason:
         raise _no_margin(pinned, r_max, 0.0) from reason
     if largest <= NO_MARGIN:
@@ -221,22 +222,22 @@ def _few(pinned: Any) -> str:
     return "{" + ", ".join(told[:NAMED]) + ("}" if len(told) <= NAMED else f" and {len(told) - NAMED} more}}")
 
 
-def _checked_size(the_set: RewardSet, pinned: Any, tau: float, r_max: float, time_limit: float | None) -> tuple[int, int]:
+def _checked_size(the_set: RewardSet, pinned: Any, tau: float, r_max: float, deadline: Deadline) -> tuple[int, int]:
     """How many unknowns and rows the set has, once there is a reward in it."""
     polytope = the_set.polytope(tau / r_max)
     rows, unknowns = polytope.A.shape
     try:
-        polytope.program(time_limit).minimise(np.zeros(unknowns))
+        polytope.program(deadline).minimise(np.zeros(unknowns))
     except SolverInfeasible as reason:
-        raise _empty(the_set, pinned, tau, r_max, time_limit) from reason
+        raise _empty(the_set, pinned, tau, r_max, deadline) from reason
     return unknowns, rows
 
 
-def _empty(the_set: RewardSet, pinned: Any, tau: float, r_max: float, time_limit: float | None) -> InvalidParameter:
+def _empty(the_set: RewardSet, pinned: Any, tau: float, r_max: float, deadline: Deadline) -> InvalidParameter:
     """Why no reward is in the set: the pins, or the margin."""
     pins = f" and pinned={_few(pinned)}" if pinned else ""
     try:
-        largest = r_max * the_set.largest_margin(time_limit) if tau else 0.0
+        largest = r_max * the_set.largest_margin(deadline) if tau else 0.0
     except SolverInfeasible:
         largest = 0.0
     if largest <= NO_MARGIN * r_max:

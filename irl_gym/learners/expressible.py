@@ -15,7 +15,7 @@ import numpy as np
 from irl_gym.learners import weights
 from irl_gym.learners.strict_rows import SERVED, strict_rows
 from irl_gym.learners.weights import ROUNDING, Rows, value_of
-from irl_gym.solvers import SolverName, solve
+from irl_gym.solvers import AUTO, Solving, solve
 
 LEAST_MARGIN = 1e-6
 """A margin below this, over the size of the rows, is none: such a row is left out of the uniform margin."""
@@ -28,9 +28,7 @@ Part = Callable[[np.ndarray], tuple[float, float, np.ndarray]]
 """(n,) rows that are in, to the program's value, what every row that counts has to reach, and alpha (K,)."""
 
 
-def most_agreement(
-    rows: Rows, near: np.ndarray | None = None, *, solver: SolverName = "auto", time_limit: float | None = None
-) -> float:
+def most_agreement(rows: Rows, near: np.ndarray | None = None, *, solving: Solving = AUTO) -> float:
     """A bound above the mean of d . alpha, over scale, of all rewards that leave *no* row below 0.
 
     Where it is 0, to rounding, the features express no reward that makes the expert optimal, but those that leave it tied with
@@ -40,12 +38,10 @@ def most_agreement(
         SolverTimeout, SolverFailed: no answer.
     """
     everything = np.ones(len(rows.d), dtype=bool)
-    return _agreement(rows.d / rows.scale, everything, near, solver, time_limit)[0]
+    return _agreement(rows.d / rows.scale, everything, near, solving)[0]
 
 
-def _agreement(
-    d: np.ndarray, wanted: np.ndarray, near: np.ndarray | None, solver: SolverName, time_limit: float | None
-) -> tuple[float, np.ndarray]:
+def _agreement(d: np.ndarray, wanted: np.ndarray, near: np.ndarray | None, solving: Solving) -> tuple[float, np.ndarray]:
     """The bound on the mean of some rows (n,), and the weights that reach it."""
     mean = d[wanted].mean(axis=0)
 
@@ -53,23 +49,20 @@ def _agreement(
         alpha = cp.Variable(len(mean))
         satisfied = d[part] @ alpha >= 0
         problem = cp.Problem(cp.Maximize(mean @ alpha), [satisfied, alpha <= 1, alpha >= -1])
-        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
+        solve(problem, rows=int(part.sum()), solving=solving)
         y = np.maximum(np.asarray(satisfied.dual_value), 0.0)
         return float(np.abs(mean + y @ d[part]).sum()), 0.0, value_of(alpha)
 
     return _generate(d, np.zeros_like(wanted), np.sign(mean) if near is None else near, solve_part)
 
 
-def uniform_margin(
-    rows: Rows, counted: np.ndarray | None = None, *, solver: SolverName = "auto", time_limit: float | None = None
-) -> float:
+def uniform_margin(rows: Rows, counted: np.ndarray | None = None, *, solving: Solving = AUTO) -> float:
     """The largest margin that all rows that count can have at once, with the others at 0 or above; 0 if there is none.
 
     Args:
         rows: n rows.
         counted: (n,) booleans; None for all that are not 0 themselves.
-        solver: see `irl_gym.solvers`.
-        time_limit: seconds for each program.
+        solving: with which solver, and until when.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
@@ -85,24 +78,21 @@ def uniform_margin(
         alpha, margin = cp.Variable(d.shape[1]), cp.Variable()
         above = d[part] @ alpha >= margin * served[part].astype(float)
         problem = cp.Problem(cp.Maximize(margin), [above, alpha <= 1, alpha >= -1, margin <= d.shape[1]])  # bounded by no row
-        solve(problem, rows=int(part.sum()), solver=solver, time_limit=time_limit)
+        solve(problem, rows=int(part.sum()), solving=solving)
         return float(np.asarray(margin.value)), float(np.asarray(margin.value)), value_of(alpha)
 
     found, _ = _generate(d, served, np.sign(d[served].mean(axis=0)), solve_part)
     return found * rows.scale if found > 1e-7 else 0.0  # below, it is the solvers' rounding
 
 
-def breakable(
-    rows: Rows, states: np.ndarray, wanted: np.ndarray, *, solver: SolverName = "auto", time_limit: float | None = None
-) -> np.ndarray:
+def breakable(rows: Rows, states: np.ndarray, wanted: np.ndarray, *, solving: Solving = AUTO) -> np.ndarray:
     """(n,) the wanted rows that some weights make strict, with every row at 0 or above.
 
     Args:
         rows: n rows.
         states: (n,) state of each, increasing.
         wanted: (n,) rows in question.
-        solver: see `irl_gym.solvers`.
-        time_limit: seconds for each program.
+        solving: with which solver, and until when.
 
     Raises:
         SolverTimeout, SolverFailed: no answer.
@@ -113,7 +103,7 @@ def breakable(
         """The margins of all rows, in units of the least, under the sum of the best weights for what is left of those asked."""
         alpha, left = np.zeros(d.shape[1]), asked.copy()
         while left.any():
-            most, more = _agreement(d, left, None, solver, time_limit)
+            most, more = _agreement(d, left, None, solving)
             new = left & (d @ more > SERVED * LEAST_MARGIN)
             if most <= NOTHING or not new.any():
                 break

@@ -44,7 +44,7 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import Policy
-from irl_gym.solvers import SolverName
+from irl_gym.solvers import SolverName, Solving
 from irl_gym.states import States
 
 
@@ -77,7 +77,7 @@ class FeatureLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for each program; None for no limit."""
+    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
 
@@ -140,11 +140,12 @@ class FeatureLP:
         if states is None:
             check_length(self.phi, mdp.n_states)
         S_0: Any = self.S_0
+        solving = Solving.begun(self.solver, self.time_limit)
         expert, known = completed(expert, mdp.n_states)
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted, printed=self.trivial_rows == "as printed")
-        solved = solve_features(self, found)
+        solved = solve_features(self, found, solving)
         weights = solved.weights
         reward = self._reward(weights)
         tabular = reward.tabular(mdp.n_states if states is None else states)
@@ -157,7 +158,7 @@ class FeatureLP:
             raise InvalidPolicy(
                 f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
             )
-        S_0 = self._states_of(model)
+        S_0, solving = self._states_of(model), Solving.begun(self.solver, self.time_limit)
         horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)
         found = rows_of_model(
             model,
@@ -169,7 +170,7 @@ class FeatureLP:
             seed=int(self.seed),
             printed=self.trivial_rows == "as printed",
         )
-        solved = solve_features(self, found)
+        solved = solve_features(self, found, solving)
         weights = solved.weights
         tolerance, error, short = np.full(len(S_0), 1e-9 * found.rows.scale), None, np.zeros(len(S_0))
         values, free = found.rows.d @ weights.alpha, ~solved.ties

@@ -13,7 +13,7 @@ import numpy as np
 from irl_gym.learners.expressible import breakable, most_agreement, uniform_margin
 from irl_gym.learners.feature_rows import FeatureRows
 from irl_gym.learners.weights import ROUNDING, Rows, Weights, best_weights
-from irl_gym.solvers import Status
+from irl_gym.solvers import Solving, Status
 
 if TYPE_CHECKING:
     from irl_gym.learners.feature import FeatureLP
@@ -37,10 +37,9 @@ class SolvedFeatures:
     bound: float
 
 
-def solve_features(learner: "FeatureLP", found: FeatureRows) -> SolvedFeatures:
+def solve_features(learner: "FeatureLP", found: FeatureRows, solving: Solving) -> SolvedFeatures:
     """The weights, and what became of them."""
     rows, unit = found.rows, NOTHING * found.rows.scale
-    solving: dict[str, Any] = {"solver": learner.solver, "time_limit": learner.time_limit}
     program: dict[str, Any] = {"slope": float(learner.penalty), "l1": float(learner.l1), "cap": np.inf}
     ties, expressible = np.zeros(len(rows.d), dtype=bool), None
     cap = None if learner.margin_cap == "auto" else learner.margin_cap
@@ -52,11 +51,11 @@ def solve_features(learner: "FeatureLP", found: FeatureRows) -> SolvedFeatures:
             cap = uniform / 2 if uniform > 0 else _typical_margin(found.apart(ties), program, solving)
     rows = found.apart(ties)
     program["cap"] = np.inf if cap is None else float(cap)
-    weights = best_weights(rows, **program, **solving)
+    weights = best_weights(rows, **program, solving=solving)
     if expressible is None:
         least = rows.least(weights.alpha)
         satisfied = bool(least.min() >= -unit and least.max() > unit)
-        expressible = satisfied or most_agreement(rows, weights.alpha, **solving) > NOTHING
+        expressible = satisfied or most_agreement(rows, weights.alpha, solving=solving) > NOTHING
     bound = rows.bound(weights.y, **program)
     if bound <= min(unit, np.inf if cap is None else NOTHING * cap):
         weights = Weights(np.zeros_like(weights.alpha), weights.y, weights.answer)  # as good, and says what is the case
@@ -69,20 +68,20 @@ def solve_features(learner: "FeatureLP", found: FeatureRows) -> SolvedFeatures:
     return SolvedFeatures(weights, status, expressible, ties, None if cap is None else float(cap), objective, bound)
 
 
-def _strict(found: FeatureRows, solving: dict[str, Any]) -> tuple[np.ndarray, float]:
+def _strict(found: FeatureRows, solving: Solving) -> tuple[np.ndarray, float]:
     """(n,) rows that some weights make strict, all others at 0 or above; and the largest margin that these have at once."""
     rows = found.rows
     moving = ~found.equal & (np.abs(rows.d).max(axis=1) > ROUNDING * rows.scale)
-    uniform = uniform_margin(rows, moving, **solving)
+    uniform = uniform_margin(rows, moving, solving=solving)
     if uniform > 0:
         return moving, uniform
-    if most_agreement(rows, **solving) <= NOTHING:
+    if most_agreement(rows, solving=solving) <= NOTHING:
         return np.zeros_like(moving), 0.0
-    strict = breakable(rows, found.row_states, moving, **solving)
-    return strict, uniform_margin(rows, strict, **solving)
+    strict = breakable(rows, found.row_states, moving, solving=solving)
+    return strict, uniform_margin(rows, strict, solving=solving)
 
 
-def _typical_margin(rows: Rows, program: dict[str, Any], solving: dict[str, Any]) -> float | None:
+def _typical_margin(rows: Rows, program: dict[str, Any], solving: Solving) -> float | None:
     """A tenth of the mean margin under the paper's reward; None where it is 0."""
-    mean = float(np.maximum(rows.least(best_weights(rows, **program, **solving).alpha), 0.0).mean())
+    mean = float(np.maximum(rows.least(best_weights(rows, **program, solving=solving).alpha), 0.0).mean())
     return mean / 10 if mean > NOTHING * rows.scale else None

@@ -38,12 +38,12 @@ from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.partial import PartialTask
-from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved, Solving
+from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved
 from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.margins import row_margins
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward
-from irl_gym.solvers import SolverName, Status, check_solving
+from irl_gym.solvers import SolverName, Solving, Status, check_solving
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class FiniteLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for each program; None for no limit."""
+    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit."""
     slack: float | None = None
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
@@ -176,6 +176,7 @@ class _Task:
 
     def __init__(self, learner: FiniteLP, mdp: TabularMDP, expert: Any):
         self.learner, self.mdp, self.expert = learner, mdp, expert
+        self.solving = Solving.begun(learner.solver, learner.time_limit)
         mdp.mixing(expert)  # checks all states, reachable or not
         self.rows = np.flatnonzero(mdp.reachable)
         self.part = mdp.restrict(self.rows)
@@ -198,8 +199,7 @@ class _Task:
 
     def program(self) -> Program:
         learner = self.learner
-        solving = Solving(learner.solver, learner.time_limit)
-        return Program(self.part, self.comparisons, learner.reward_on, self.counted, solving)
+        return Program(self.part, self.comparisons, learner.reward_on, self.counted, self.solving)
 
     def record(self, name: str, solved: Solved) -> None:
         self.stats["programs"][name] = solved.answer.to_json()

@@ -12,8 +12,7 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym.learners.programs import Solving
-from irl_gym.solvers import Answer, solve
+from irl_gym.solvers import Answer, Solving, solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class LinearProgram:
         constraints = [rows, x[low] >= self.lower[low]] + ([x[high] <= self.upper[high]] if high.size else [])
         size = self.b.size + low.size + high.size
         problem = cp.Problem(cp.Maximize(self.cost @ x), constraints)
-        answer = solve(problem, rows=size, solver=solving.solver, time_limit=solving.time_limit)
+        answer = solve(problem, rows=size, solving=solving)
         return np.asarray(x.value).ravel(), np.asarray(rows.dual_value).ravel(), answer
 
     def bound(self, multipliers: np.ndarray) -> float:

@@ -18,14 +18,14 @@ from irl_gym.certificate import Certificate
 from irl_gym.comparisons import compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverInfeasible
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Solving
+from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN
 from irl_gym.learners.soft import Found, PartlyKnown, SoftProgram
 from irl_gym.learners.soft_certificate import Terms, certify_partly
 from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
-from irl_gym.solvers import Status
+from irl_gym.solvers import Solving, Status
 
 if TYPE_CHECKING:
     from irl_gym.learners.finite import FiniteLP
@@ -55,6 +55,7 @@ class PartialTask:
 
     def __init__(self, learner: "FiniteLP", mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None):
         self.learner, self.mdp, self.visits = learner, mdp, visits
+        self.solving = Solving.begun(learner.solver, learner.time_limit)
         mdp.mixing(distribution)  # checks all states
         self.rows = np.flatnonzero(mdp.reachable)
         part = mdp.restrict(self.rows)
@@ -86,8 +87,7 @@ class PartialTask:
     def program(self, *, soft: bool) -> SoftProgram:
         """The program, with slack or with hard rows."""
         learner = self.learner
-        solving = Solving(learner.solver, learner.time_limit)
-        return SoftProgram(self.partly, learner.reward_on, self.counted, learner.slack if soft else None, solving)
+        return SoftProgram(self.partly, learner.reward_on, self.counted, learner.slack if soft else None, self.solving)
 
     def fit(self) -> IRLResult[TabularReward, Certificate]:
         """Learn the reward."""
@@ -198,9 +198,8 @@ class PartialTask:
         known = full.known.copy()
         known[c.states[given_up]] = False
         partly = PartlyKnown(full.mdp, c, known, full.avoided, full.weights, full.active & ~given_up)
-        solving = Solving(self.learner.solver, self.learner.time_limit)
         counted = self.counted & ~given_up if counted is None else counted
-        return SoftProgram(partly, self.learner.reward_on, counted, None, solving)
+        return SoftProgram(partly, self.learner.reward_on, counted, None, self.solving)
 
     def _uniform(self, program: SoftProgram, need: np.ndarray, largest: float = LARGEST_BOUND) -> float | None:
         try:

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from irl_gym.comparisons import Comparisons
 from irl_gym.mdp import TabularMDP
-from irl_gym.solvers import Answer, SolverName, solve
+from irl_gym.solvers import Answer, Solving, solve
 
 RewardOn = Literal["state", "state-action"]
 JUST_BELOW = 1 - 1e-3
@@ -29,14 +29,6 @@ NO_MARGIN = 1e-9
 """A margin below this, relative to R_max, is none: it is the solvers' rounding."""
 LARGEST_BOUND = 1e6
 """A margin below R_max over this is none: such a row is left out of the uniform margin."""
-
-
-@dataclass(frozen=True)
-class Solving:
-    """How the programs are solved: what `solvers.solve` takes."""
-
-    solver: SolverName = "auto"
-    time_limit: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +50,7 @@ class Program:
         comparisons: the rows of (4).
         reward_on: what the reward is a function of.
         rows: (n,) booleans, the rows that count towards margins; their states are those with a margin.
-        solving: solver and time limit.
+        solving: with which solver, and until when.
     """
 
     def __init__(self, mdp: TabularMDP, comparisons: Comparisons, reward_on: RewardOn, rows: np.ndarray, solving: Solving):
@@ -119,7 +111,7 @@ class Program:
         constraints = [*self.constraints, *(row for _, row in rows)]
         problem = cp.Problem(objective, constraints)
         size = sum(constraint.size for constraint in constraints)
-        answer = solve(problem, rows=size, solver=self.solving.solver, time_limit=self.solving.time_limit)
+        answer = solve(problem, rows=size, solving=self.solving)
         y = np.zeros(self.counted.size)
         for mask, row in rows:
             y[mask] = np.asarray(row.dual_value).ravel()

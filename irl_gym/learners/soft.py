@@ -35,9 +35,9 @@ import scipy.sparse as sp
 from irl_gym._typing import StateMask, Vector
 from irl_gym.comparisons import Comparisons
 from irl_gym.learners.linear_program import LinearProgram
-from irl_gym.learners.programs import RewardOn, Solving, picking
+from irl_gym.learners.programs import RewardOn, picking
 from irl_gym.mdp import TabularMDP
-from irl_gym.solvers import Answer
+from irl_gym.solvers import Answer, Solving
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class SoftProgram:
         reward_on: what the reward is a function of; rewards on steps have no slack, since none is ever needed.
         counted: (n,) rows that count towards margins.
         slack: C >= 1, or None for hard rows.
-        solving: solver and time limit.
+        solving: with which solver, and until when.
     """
 
     def __init__(

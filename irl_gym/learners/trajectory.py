@@ -17,7 +17,7 @@ Axes: N episodes, K features.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
 from irl_gym.learners.weights import Rows, Weights, best_weights
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
-from irl_gym.solvers import SolverName, Status
+from irl_gym.solvers import SolverName, Solving, Status
 
 
 @runtime_checkable
@@ -91,7 +91,8 @@ class TrajectoryLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for each program; None for no limit."""
+    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit.
+    Planning is not cut: the time is up when the next program would begin."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
@@ -141,6 +142,7 @@ class TrajectoryLP:
                 f"the world is a {type(world).__name__}: expected one that can be run and solved, such as "
                 "Simulator(env, ValueIteration(), gamma)."
             )
+        solving = Solving.begun(self.solver, self.time_limit)
         asked = least_horizon(world.gamma) if self.horizon is None else int(self.horizon)
         expert = usable(episodes, asked, getattr(world, "limit", None))
         horizon, r_unit = expert.horizon, self._largest(expert.episodes)
@@ -148,9 +150,8 @@ class TrajectoryLP:
         found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
         for number in range(1, self.max_rounds + 1):
             rows = Rows(theirs.mean - np.array([one.mean for one in found]), np.arange(len(found)))
-            solving: dict[str, Any] = {"solver": self.solver, "time_limit": self.time_limit}
             program = {"slope": float(self.penalty), "l1": float(self.l1), "cap": self._cap(rows, solving)}
-            weights = best_weights(rows, **program, **solving)
+            weights = best_weights(rows, **program, solving=solving)
             reward = LinearReward(weights.alpha, self.phi, {"learner": "TrajectoryLP", "scaling": self.phi.scaling})
             policy = world.plan(reward, seed=self.seed + number)
             sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
@@ -174,9 +175,9 @@ class TrajectoryLP:
         """The largest ||phi||_1 that the expert met: no reward with |alpha_i| <= 1 pays it more."""
         return max(float(np.abs(checked_features(self.phi, one.observations)).sum(axis=1).max()) for one in expert)
 
-    def _cap(self, rows: Rows, solving: dict[str, Any]) -> float:
+    def _cap(self, rows: Rows, solving: Solving) -> float:
         """What a gap counts up to; infinite for no cap."""
-        uniform = uniform_margin(rows, **solving) if self.gap_cap == "auto" else 0.0
+        uniform = uniform_margin(rows, solving=solving) if self.gap_cap == "auto" else 0.0
         return uniform / 2 if uniform > 0 else np.inf
 
     def _certificate(

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym.features import blocks
-from irl_gym.solvers import Answer, SolverName, solve
+from irl_gym.solvers import AUTO, Answer, Solving, solve
 
 ROUNDING = 1e-12
 """Singular values of the rows below this, over the largest, are the rounding of values."""
@@ -108,15 +108,7 @@ SAMPLE = 2_000
 """Groups up to which the program is solved as it stands; above, by generating its kinks."""
 
 
-def best_weights(
-    rows: Rows,
-    *,
-    slope: float,
-    l1: float,
-    cap: float = np.inf,
-    solver: SolverName = "auto",
-    time_limit: float | None = None,
-) -> Weights:
+def best_weights(rows: Rows, *, slope: float, l1: float, cap: float = np.inf, solving: Solving = AUTO) -> Weights:
     """Solve the program.
 
     An optimum is a vertex, at which at most K of the G concave terms have a kink; all others are linear around it. So with many
@@ -127,19 +119,19 @@ def best_weights(
     Raises:
         SolverTimeout, SolverFailed: no answer.
     """
-    solving = _Solving(slope, l1, cap, solver, time_limit)
+    program = _Program(slope, l1, cap, solving)
     K = rows.d.shape[1]
     if rows.n_groups <= SAMPLE:
-        return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(K), np.array([-np.ones(K), np.ones(K)]), solving)
+        return _solve_part(rows, np.ones(rows.n_groups, dtype=bool), np.zeros(K), np.array([-np.ones(K), np.ones(K)]), program)
     part = np.zeros(rows.n_groups, dtype=bool)
     part[np.linspace(0, rows.n_groups - 1, SAMPLE).astype(int)] = True
-    best = _solve_part(rows, part, np.zeros(K), np.array([-np.ones(K), np.ones(K)]), solving).alpha
+    best = _solve_part(rows, part, np.zeros(K), np.array([-np.ones(K), np.ones(K)]), program).alpha
     value, radius, extra, stalls = rows.objective(best, slope=slope, l1=l1, cap=cap), RADIUS, np.zeros_like(part), 0
     while True:
         part = _kinks(rows, best, cap) | extra
         active, weight = rows.active(best, slope, cap)
         box = np.clip([best - radius, best + radius], -1, 1)
-        found = _solve_part(rows, part, (weight * ~part) @ rows.d[active], box, solving)
+        found = _solve_part(rows, part, (weight * ~part) @ rows.d[active], box, program)
         model = np.where(weight == 0, cap if np.isfinite(cap) else 0.0, 0.0) + weight * (rows.d[active] @ found.alpha)
         missing = ~part & (model > rows.terms(found.alpha, slope, cap) + 1e-9 * rows.scale)
         now = rows.objective(found.alpha, slope=slope, l1=l1, cap=cap)
@@ -164,12 +156,11 @@ RADIUS, LEAST_RADIUS, MOST_STALLS = 0.25, 1e-4, 30
 
 
 @dataclass(frozen=True)
-class _Solving:
+class _Program:
     slope: float
     l1: float
     cap: float
-    solver: SolverName
-    time_limit: float | None
+    solving: Solving
 
 
 def _kinks(rows: Rows, alpha: np.ndarray, cap: float) -> np.ndarray:
@@ -184,7 +175,7 @@ def _kinks(rows: Rows, alpha: np.ndarray, cap: float) -> np.ndarray:
     return mask
 
 
-def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, box: np.ndarray, solving: _Solving) -> Weights:
+def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, box: np.ndarray, program: _Program) -> Weights:
     """The program with the rows of some groups only; the others are in `linear` (K,), the gradient of their sum.
 
     `box` (2, K) is what alpha lies between.
@@ -196,16 +187,16 @@ def _solve_part(rows: Rows, part: np.ndarray, linear: np.ndarray, box: np.ndarra
     alpha, u, v = cp.Variable(rows.d.shape[1]), cp.Variable(G, nonneg=True), cp.Variable(G, nonneg=True)
     picks = sp.csr_array((np.ones(n), (np.arange(n), groups)), shape=(n, G))
     above: Any = picks @ (u - v) <= d @ alpha
-    objective = cp.sum(u) - solving.slope * cp.sum(v) + (linear / rows.scale) @ alpha
+    objective = cp.sum(u) - program.slope * cp.sum(v) + (linear / rows.scale) @ alpha
     constraints: list[Any] = [above, alpha >= box[0], alpha <= box[1]]
-    if np.isfinite(solving.cap):
-        constraints.append(u <= solving.cap / rows.scale)
-    if solving.l1:
+    if np.isfinite(program.cap):
+        constraints.append(u <= program.cap / rows.scale)
+    if program.l1:
         size = cp.Variable(alpha.size)
         constraints += [size >= alpha, size >= -alpha]
-        objective = objective - (solving.l1 / rows.scale) * cp.sum(size)
+        objective = objective - (program.l1 / rows.scale) * cp.sum(size)
     problem = cp.Problem(cp.Maximize(objective), constraints)
-    answer = solve(problem, rows=n, solver=solving.solver, time_limit=solving.time_limit)
+    answer = solve(problem, rows=n, solving=program.solving)
     y = np.zeros(len(rows.groups))
     y[kept] = above.dual_value
     return Weights(np.clip(value_of(alpha), *box), y, answer)

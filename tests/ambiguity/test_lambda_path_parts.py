@@ -90,7 +90,7 @@ def test_envelope_counts_loose_bounds_as_gap():
 
 def test_program_is_solved_afresh_when_the_last_basis_leads_nowhere(monkeypatch):
     model = paper_grid()
-    program = PricedProgram(model.mdp, model.expert, r_max=1.0, cap=None, on_states=True, time_limit=None)
+    program = PricedProgram(model.mdp, model.expert, r_max=1.0, cap=None, on_states=True)
     whole, calls = program.at(0.3), []
     real = program.lp.minimise
 
@@ -107,7 +107,7 @@ def test_program_is_solved_afresh_when_the_last_basis_leads_nowhere(monkeypatch)
 
 def test_program_is_solved_afresh_when_its_answer_is_short_of_the_bound(monkeypatch):
     model = paper_grid()
-    program = PricedProgram(model.mdp, model.expert, r_max=1.0, cap=None, on_states=True, time_limit=None)
+    program = PricedProgram(model.mdp, model.expert, r_max=1.0, cap=None, on_states=True)
     real, calls = program.lp.minimise, []
 
     def inexact(cost):

@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from irl_gym.learners.linear_program import LinearProgram
-from irl_gym.learners.programs import Solving, picking
+from irl_gym.learners.programs import picking
+from irl_gym.solvers import Solving
 
 
 def drawn(seed, n=4, m=6):

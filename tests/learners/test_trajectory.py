@@ -1,6 +1,7 @@
 """TrajectoryLP is the program of section 5 of Ng & Russell (2000), and what its rounds say of themselves is so."""
 
 from dataclasses import replace
+from itertools import count
 
 import models
 import numpy as np
@@ -8,9 +9,10 @@ import pytest
 from gymnasium import spaces
 from scipy.optimize import linprog
 
+from irl_gym import deadline
 from irl_gym.demonstrations import Episode
 from irl_gym.dynamic_programming import occupancy, value_iteration
-from irl_gym.errors import InvalidDemonstrations
+from irl_gym.errors import InvalidDemonstrations, SolverTimeout
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import Functions, OneHot, Table
 from irl_gym.generative import least_horizon
@@ -178,6 +180,15 @@ def test_trajectory_lp_cuts_trajectories_after_the_horizon(asked, expected):
     world = Chain()
     (one,) = learner(horizon=asked, max_rounds=1).iterate(world, world.expert(5))
     assert one.certificate.horizon == expected
+
+
+def test_trajectory_lp_shares_its_time_among_all_rounds(monkeypatch):
+    world, results = Chain(), []
+    monkeypatch.setattr(deadline.time, "monotonic", map(float, count()).__next__)  # a second passes whenever it is asked
+    with pytest.raises(SolverTimeout, match="which all programs of a fit have together"):
+        for result in TrajectoryLP(OneHot(8), trajectories=50, horizon=50, time_limit=12.0).iterate(world, world.expert(20)):
+            results.append(result)
+    assert 0 < len(results) < 12
 
 
 def test_trajectory_lp_cuts_all_where_a_time_limit_cut_the_expert():

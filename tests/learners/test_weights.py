@@ -10,6 +10,7 @@ from irl_gym.errors import SolverTimeout
 from irl_gym.learners import weights
 from irl_gym.learners.expressible import most_agreement
 from irl_gym.learners.weights import Rows, best_weights
+from irl_gym.solvers import Solving
 
 WHOLE = 10**9
 KINDS = ("normal", "ties", "low rank", "zeros", "scaled")
@@ -74,7 +75,7 @@ def test_best_weights_reach_the_bound(kind, slope, l1):
 @pytest.mark.parametrize("solver", ["highs", "clarabel"])
 def test_best_weights_do_not_depend_on_the_solver(solver):
     rows = random_rows(0)
-    found = best_weights(rows, slope=2.0, l1=0.5, solver=solver)
+    found = best_weights(rows, slope=2.0, l1=0.5, solving=Solving(solver))
     assert found.answer.solver == solver
     assert rows.objective(found.alpha, slope=2.0, l1=0.5) == pytest.approx(
         rows.objective(best_weights(rows, slope=2.0, l1=0.5).alpha, slope=2.0, l1=0.5), rel=1e-7
@@ -83,7 +84,7 @@ def test_best_weights_do_not_depend_on_the_solver(solver):
 
 def test_best_weights_stop_when_the_time_is_up():
     with pytest.raises(SolverTimeout, match="1e-09 s"):
-        best_weights(random_rows(0, G=500, K=50), slope=2.0, l1=0.1, solver="clarabel", time_limit=1e-9)
+        best_weights(random_rows(0, G=500, K=50), slope=2.0, l1=0.1, solving=Solving.begun("clarabel", 1e-9))
 
 
 # --- by generated kinks ---

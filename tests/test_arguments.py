@@ -110,6 +110,7 @@ def test_an_argument_reaches_the_experiment(arguments, field, expected):
         ({"learner": "trajectory-lp"}, "max_rounds", 30),
         ({"learner": "trajectory-lp", "env_id": "CartPole-v1"}, "max_rounds", 8),
         ({"learner": "trajectory-lp", "bins": (9,), **CAR}, "max_rounds", 30),
+        *[({"learner": one, "time_limit": 9.0}, "time_limit", 9.0) for one in ("finite-lp", "feature-lp", "trajectory-lp")],
     ],
 )
 def test_an_argument_reaches_the_learner(arguments, field, expected):

@@ -76,3 +76,12 @@ def test_a_command_that_is_not_ours_is_said_to_be_anothers(called, stranger):
     (cwd / "a" / "reward.npz").unlink()
     done = called(SCRIPTS / "report.py", "--run", "a", cwd=cwd)
     assert "A command of another program, it says, continues it: rm -rf all --out a" in done.stderr
+
+
+@pytest.mark.parametrize("program", COMMANDS)
+def test_no_zip_of_a_run_is_opened(called, stranger, program):
+    cwd = stranger({})
+    for folder in "ab":
+        for name in ("expert.zip", "agent.zip"):  # to open one would fail
+            (cwd / folder / name).mkdir()
+    assert called(SCRIPTS / f"{program}.py", *COMMANDS[program], cwd=cwd).returncode == 0

@@ -89,6 +89,8 @@ class Demonstrations:
     """Learn from this Minari dataset, in place of an expert."""
     dataset_root: Annotated[str | None, UNSET] = None
     """Minari's root folder; the default is Minari's own."""
+    trust_dataset: bool = False
+    """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
 
     @property
     def file(self) -> str | None:
@@ -210,8 +212,9 @@ class Arguments:
             learner: Any = self.learning.finite(from_episodes=shown.dataset is not None or shown.epsilon > 0)
         else:
             env = environment_of(
-                env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal
-            )
+                env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal,
+                trust_dataset=shown.trust_dataset,
+            )  # fmt: skip
             control = not self.table.bins and steps_only(env)
             discrete = isinstance(env.observation_space, spaces.Discrete)
             learner = self.learning.linear(env, control, self.seed)
@@ -227,6 +230,7 @@ class Arguments:
         return Experiment(
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
             bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
+            shown.trust_dataset,
             expert=planner(cast("PlannerName | None", shown.expert)) if file is None else FromFile.at(file),
             epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, inner=planner(self.learning.inner),
             shaping=self.retraining.shaping, retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,

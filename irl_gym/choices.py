@@ -10,12 +10,13 @@ from gymnasium import spaces
 
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.coordinates import coordinates_of
-from irl_gym.datasets import load_minari, recorded_environment
+from irl_gym.datasets import load_minari
 from irl_gym.errors import InvalidFeatures, NotDiscrete, NotSettable
 from irl_gym.features import FeatureMap, OneHot, Unravel
 from irl_gym.integer_spaces import ranges
 from irl_gym.layouts import grid_shape
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Algorithm, Planner, ValueIteration
+from irl_gym.recorded import recorded_environment
 from irl_gym.reveal import Reveal, known_hidden
 from irl_gym.seeded_starts import SeededStarts
 from irl_gym.tabulate import make
@@ -42,6 +43,7 @@ def environment_of(
     *,
     start_seeds: Sequence[int] = (),
     reveal: Reveals = KNOWN,
+    trust_dataset: bool = False,
 ) -> gym.Env:
     """The environment of an id, or the one that a dataset was recorded in.
 
@@ -53,15 +55,17 @@ def environment_of(
         start_seeds: seeds of the layouts that resets draw from; none for whatever resets draw.
         reveal: hidden integers that the observation shall show, and their numbers of values; "known" for those that are
             known to be hidden.
+        trust_dataset: import and call what the dataset names, whatever it is.
 
     Raises:
         UnknownEnvironment: no such id.
+        NotTrusted: a dataset that names more than a registered environment, and is not trusted.
         DatasetMissing: no such dataset.
         DatasetMismatch: a dataset that does not say where it was recorded.
         InvalidParameter: arguments, seeds or names that the environment does not take.
     """
     if env_id is None:
-        return recorded_environment(load_minari(dataset or "", root=dataset_root))
+        return recorded_environment(load_minari(dataset or "", root=dataset_root), trust=trust_dataset)
     env = make(env_id, **env_kwargs)
     if start_seeds:
         env = SeededStarts(env, tuple(start_seeds))

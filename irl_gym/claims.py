@@ -27,6 +27,8 @@ FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 STAGES = (*FIRST, "record", "ambiguity", "report")
 """All stages after the table."""
 VERSION, ENVIRONMENT = "run.json", "environment.json"
+PROGRAM = ["python", "scripts/recover_and_retrain.py"]
+"""How a run's command begins, unless another program started it."""
 AGAIN = "runs/again"
 """The folder of a run that is made again."""
 
@@ -103,6 +105,11 @@ def into_folder(command: Sequence[str], folder: str = AGAIN) -> list[str]:
             kept.append(word)
         skipped = flag == "--out" and "=" not in word
     return [*kept, "--out", folder]
+
+
+def ours(command: Sequence[str]) -> bool:
+    """Is a command that a file names one of this library's scripts? Any other could be anything, and is said to be."""
+    return list(map(str, command[:2])) == PROGRAM
 
 
 def flag_of(word: str) -> str:

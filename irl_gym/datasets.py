@@ -5,6 +5,7 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 """
 
 import contextlib
+import json
 import os
 import shutil
 import tempfile
@@ -16,6 +17,7 @@ import gymnasium as gym
 import minari
 import numpy as np
 from gymnasium import spaces
+from minari.dataset.minari_storage import MinariStorage
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations import Episode
@@ -25,7 +27,6 @@ from irl_gym.errors import (
     InvalidDemonstrations,
     InvalidParameter,
     NotDiscrete,
-    UnknownEnvironment,
 )
 from irl_gym.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.minari_formats import DataFormat
@@ -170,9 +171,30 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
                 "folder, or set MINARI_DATASETS_PATH."
             )
         try:
+            _check_told(dataset_id, MinariStorage.read_raw_metadata(base / dataset_id / "data"))
             return minari.load_dataset(dataset_id)
         except _BROKEN as error:
             raise _broken(dataset_id, error) from error
+
+
+def _check_told(dataset_id: str, metadata: Any) -> None:
+    """Check that a dataset tells its spaces: where it does not, Minari would make whatever environment it names to see them.
+
+    Raises:
+        InvalidDemonstrations: it does not, or its environment's arguments are no arguments.
+    """
+    for name in ("observation_space", "action_space"):
+        if name not in metadata:
+            raise InvalidDemonstrations(
+                f"dataset {dataset_id!r} has no {name} in its metadata.json: expected both spaces, since an environment that a "
+                "file names is not made to see them. Add it, as minari.serialization.serialize_space writes it."
+            )
+    told = json.loads(metadata.get("env_spec") or "{}")
+    if not isinstance(told.get("kwargs", {}), dict):
+        raise InvalidDemonstrations(
+            f"dataset {dataset_id!r} was recorded with the arguments {told['kwargs']!a:.90}: expected names and values. "
+            "Record it anew, or take env_spec out of its metadata.json."
+        )
 
 
 def read_minari(
@@ -255,7 +277,7 @@ def _check_recorded(dataset: minari.MinariDataset, env: gym.Env) -> None:
         if identity(spec) != identity(env.spec):
             raise DatasetMismatch(
                 f"dataset {name!r} was recorded in {told(spec)}: expected {told(env.spec)}. Leave --env-id and --env-kwargs "
-                "out, or make the environment with `dataset.recover_environment()`."
+                "out; in Python, make the environment with `irl_gym.recorded.recorded_environment(dataset)`."
             )
         return
     for what in ("observation", "action"):
@@ -265,29 +287,3 @@ def _check_recorded(dataset: minari.MinariDataset, env: gym.Env) -> None:
                 f"dataset {name!r} has {what}s of {found}: expected {wanted}, as the environment has. Name the one that it was "
                 "recorded in, or one with its spaces."
             )
-
-
-def recorded_environment(dataset: minari.MinariDataset) -> gym.Env:
-    """The environment that a dataset was recorded in, made anew.
-
-    Raises:
-        DatasetMismatch: the dataset does not say, or what it says cannot be made here.
-        UnknownEnvironment: an environment that is unknown here, named.
-    """
-    name, spec = dataset.spec.dataset_id, dataset.env_spec
-    if spec is None:
-        raise DatasetMismatch(
-            f"dataset {name!r} does not say where it was recorded: expected an environment. Name one with --env-id."
-        )
-    try:
-        return dataset.recover_environment()
-    except (ImportError, AttributeError, gym.error.Error) as error:
-        raise UnknownEnvironment(
-            f"environment {spec.id!r}, in which dataset {name!r} was recorded, is unknown here ({error}): expected one that "
-            "can be imported. Install or import the package that registers it, or name an environment with --env-id."
-        ) from error
-    except (TypeError, ValueError, KeyError) as error:
-        raise DatasetMismatch(
-            f"environment {spec.id!r}, in which dataset {name!r} was recorded, cannot be made here ({type(error).__name__}: "
-            f"{error}): expected it to take {spec.kwargs}. Is it another version? Name an environment with --env-id."
-        ) from error

@@ -11,6 +11,7 @@ IrlGymError
 │   ├── UnknownObservation     an observation that the state index does not hold
 │   └── InvalidDemonstrations  episodes that no environment could have produced
 ├── UnknownEnvironment         an id that is not registered; the closest names are offered
+├── NotTrusted                 what a file names, and would have been imported and called
 ├── NotDiscrete                a space with infinitely many elements where finitely many are needed
 ├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
 │   ├── HiddenState            one observation that behaves in two ways: it hides part of the state
@@ -79,6 +80,10 @@ class InvalidDemonstrations(InvalidInput):
 
 class UnknownEnvironment(IrlGymError):
     """An environment id that is not registered."""
+
+
+class NotTrusted(IrlGymError):
+    """What a file names, which is not imported and called on its word."""
 
 
 class NotDiscrete(IrlGymError):

@@ -51,6 +51,8 @@ class Experiment:
     """A Minari dataset of the expert's episodes, in place of an expert."""
     dataset_root: str | None = None
     """Minari's root folder; None for the one in force."""
+    trust_dataset: bool = False
+    """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
     expert: Planner | None = None
     """Plans or learns under the true reward; None for ValueIteration where there is a table, else SB3."""
     epsilon: float = 0.0
@@ -117,7 +119,8 @@ class Experiment:
 
     def to_json(self) -> dict[str, Any]:
         """The configuration as json; planners, learners and features with their class's name, large arrays by their digest."""
-        return {name: _described(getattr(self, name)) for name in self.__dataclass_fields__}
+        left_out = () if self.trust_dataset else ("trust_dataset",)  # runs of earlier versions have no such entry
+        return {name: _described(getattr(self, name)) for name in self.__dataclass_fields__ if name not in left_out}
 
 
 MOST_LISTED = 64

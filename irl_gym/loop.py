@@ -68,6 +68,7 @@ class Loop:
 
     Raises:
         UnknownEnvironment: no such environment.
+        NotTrusted: the dataset names more than a registered environment, and is not trusted.
         NotTabular, NotDiscrete: no table can be made, and the learner needs one.
         DatasetMismatch: the dataset was recorded in another environment.
         RunConflict: the folder holds another run.
@@ -88,7 +89,7 @@ class Loop:
         check_savable(getattr(experiment.learner, "features", None))
         self.env = environment_of(
             experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root,
-            start_seeds=experiment.start_seeds, reveal=experiment.reveal,
+            start_seeds=experiment.start_seeds, reveal=experiment.reveal, trust_dataset=experiment.trust_dataset,
         )  # fmt: skip
         path, config = Path(out), experiment.to_json()
         claim(path, config)

@@ -47,7 +47,9 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
         )
     if asked.bins is not None:
         method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
-        table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
+        table = kept_table(out, env.observation_space)  # as the cells of an earlier start were kept
+        if table is None:
+            table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
         return TableWorld(env, table, asked.num_envs or 64, seed, limit)
     try:
         return TableWorld(env, _table(asked, env, out, tell), asked.num_envs or 64, seed, limit)

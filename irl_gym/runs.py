@@ -7,7 +7,7 @@ import json
 import os
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +15,18 @@ import numpy as np
 from gymnasium import spaces
 from minari.serialization import deserialize_space
 
-from irl_gym.choices import environment_of
-from irl_gym.claims import AGAIN, FIRST, STAGES, check_format, into_folder, shell_command
+from irl_gym.claims import AGAIN, ENVIRONMENT, FIRST, STAGES, check_format, into_folder, ours, shell_command
 from irl_gym.curves import Curve, read_curve
-from irl_gym.discretize import discretize
-from irl_gym.errors import IrlGymError, RunIncomplete
+from irl_gym.errors import InvalidInput, IrlGymError, RunIncomplete
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
-from irl_gym.names import action_names, state_name
+from irl_gym.names import state_name
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+from irl_gym.verified import recomputed
 
 SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
 """What is raised by content that no run leaves."""
@@ -76,6 +75,8 @@ class Run:
     lambda_path: Mapping[str, Any] | None
     """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
     exact, whether these are all pieces, and gap, what others can be worth."""
+    recomputed: bool = False
+    """Is what the metrics say of the expert's loss under the reward computed from these files, not the run's record?"""
 
     @property
     def tabular(self) -> TabularReward | None:
@@ -126,10 +127,9 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     for name in FIRST if older else STAGES[:-1]:
         if name not in stages:
             raise reader.incomplete(f"the stage {name!r} was not finished")
-    env_id, observations, names = _environment(reader, config)
+    env_id, observations, names = _environment(reader)
     metrics = reader.read("metrics.json", read_json)
     on_table = metrics.get("table") is not None
-    films = path / "films"
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
@@ -140,13 +140,13 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         curve=reader.read("learning_curve.csv", read_curve), stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
-               if (films / f"{name}.json").exists()},
+               if (path / "films" / f"{name}.json").exists()},
         diagnosis=reader.maybe("diagnosis.json", read_json),
         widths=_part(reader.maybe("ambiguity.npz", _arrays), "widths"),
         lambda_path=_part(reader.maybe("ambiguity.npz", _arrays), "path"),
     )  # fmt: skip
     _check_shapes(run, reader)
-    return run
+    return _with_proof(run, reader)
 
 
 @contextlib.contextmanager
@@ -186,9 +186,8 @@ class _Reader:
         """The error of a run that has to be continued."""
         here = None if self.command is None else into_folder(self.command, str(self.path))
         again = shell_command(here) or f"recover_and_retrain(experiment, {str(self.path)!r}) with the same experiment"
-        return RunIncomplete(
-            f"{self.path} is incomplete: {what}: expected a finished run. The same command continues it: {again}"
-        )
+        how = "The same command" if self.command is None or ours(self.command) else "A command of another program, it says,"
+        return RunIncomplete(f"{self.path} is incomplete: {what}: expected a finished run. {how} continues it: {again}")
 
     def lost(self, what: str) -> RunIncomplete:
         """The error of a run that cannot be continued, since what says which run it is is gone."""
@@ -225,14 +224,14 @@ class _Reader:
             return None
 
 
-def _environment(reader: _Reader, config: Mapping[str, Any]) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    """Id, observation space and names of the actions; of a run of an earlier version from the environment itself."""
-    told = reader.maybe("environment.json", _told)
-    if told is not None:
-        return told
-    env = _made(config)
-    env_id = config.get("env_id") if env.spec is None else env.spec.id
-    return env_id, env.observation_space, action_names(env)
+def _environment(reader: _Reader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
+    """Id, observation space and names of the actions, which are read: no environment is made on the word of a folder."""
+    if (told := reader.maybe(ENVIRONMENT, _told)) is None:
+        raise reader.incomplete(
+            f"it has no {ENVIRONMENT}, which says what is observed (earlier versions wrote none), and no environment is made "
+            "to read a run; in Python, `irl_gym.claims.write_environment(path, env, env_id)` adds it"
+        )
+    return told
 
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
@@ -240,19 +239,14 @@ def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
     return content["id"], deserialize_space(json.loads(content["observations"])), tuple(content["actions"])
 
 
-def _made(config: Mapping[str, Any]) -> Any:
-    return environment_of(
-        config.get("env_id"), config.get("env_kwargs", {}), config.get("dataset"), config.get("dataset_root"),
-        start_seeds=config.get("start_seeds", ()), reveal=config.get("reveal", "known"),
-    )  # fmt: skip
-
-
 def _table(reader: _Reader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:
-    """The table that is kept; one of cells is made again, which takes as long as the first time."""
-    if config.get("bins") is None:
-        return reader.read(TABLE, lambda path: load_table(path, observations))
-    method: dict[str, Any] = {"successors": "sampled", "samples": config["samples"]} if config["samples"] else {}
-    return discretize(_made(config), gamma=config["gamma"], bins=config["bins"], seed=config["seed"], **method)
+    """The table that is kept, also of cells."""
+    if config.get("bins") is not None and not (reader.path / TABLE).exists():
+        raise reader.incomplete(
+            f"it has no {TABLE} of its cells (earlier versions kept none; nor is one kept of coordinates that a class of your "
+            "own shows), and no environment is made to read a run; in Python, `read_run(path, discretize(env, ...))` reads it"
+        )
+    return reader.read(TABLE, lambda path: load_table(path, observations))
 
 
 def _check_shapes(run: Run, reader: _Reader) -> None:
@@ -271,6 +265,24 @@ def _check_shapes(run: Run, reader: _Reader) -> None:
                 f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; delete it, and its stage is "
                 "run again"
             )
+
+
+def _with_proof(run: Run, reader: _Reader) -> Run:
+    """The run with its reward's proof as its files give it now, where they do.
+
+    Raises:
+        RunIncomplete: they contradict what was recorded.
+    """
+    reward = run.tabular
+    if run.table is None or reward is None:
+        return run
+    try:
+        found = recomputed(run.path, run.config, run.metrics["reward"], run.table, run.expert, reward)
+    except InvalidInput as error:
+        again = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
+        raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {again}") from error
+    told = {**run.metrics["reward"], **(found or {})}
+    return replace(run, metrics={**run.metrics, "reward": told}, recomputed=found is not None)
 
 
 def _actions(path: Path) -> np.ndarray:

@@ -9,11 +9,14 @@ import os
 import struct
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any, TypeGuard
 
 import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
+from irl_gym.cells import Cells
+from irl_gym.coordinates import CircularCoordinates, Coordinates, IntegerCoordinate
 from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
@@ -33,7 +36,7 @@ UNDER_WAY = ".enumeration.tmp.npz"
 
 def keep_table(table: Tabulation, folder: Path) -> None:
     """Keep a table in a folder, unless it is there; forget the enumeration that led to it."""
-    if not (folder / TABLE).exists() and isinstance(table.states, StateIndex | ListedStates):
+    if not (folder / TABLE).exists() and _kept(table.states):
         save_table(table, folder / TABLE)
     (folder / UNDER_WAY).unlink(missing_ok=True)
 
@@ -54,15 +57,16 @@ def kept_table(folder: Path, space: spaces.Space) -> Tabulation | None:
 
 
 def save_table(table: Tabulation, path: str | os.PathLike) -> None:
-    """Write a table whose states are integers (a StateIndex or ListedStates); beside first, then renamed.
+    """Write a table of a StateIndex, ListedStates or Cells; beside first, then renamed.
 
     Raises:
-        InvalidMDP: states of another numbering, such as the cells of a grid.
+        InvalidMDP: states of another numbering, or cells of coordinates of another class than those here.
     """
     states, mdp, path = table.states, table.mdp, Path(path)
-    if not isinstance(states, StateIndex | ListedStates):
+    if not _kept(states):
         raise InvalidMDP(
-            f"the states are {type(states).__name__}: expected a StateIndex or ListedStates. Make such a table again instead."
+            f"the states are {type(states).__name__}: expected a StateIndex, ListedStates, or Cells of coordinates that no "
+            "class of your own shows. Make such a table again instead."
         )
     evidence = asdict(table.evidence)
     none = np.zeros(0)
@@ -77,6 +81,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
         space=np.array(str(states.space)),
         numbers=states.numbers if isinstance(states, ListedStates) else none,
         copies=np.array(list(states.terminal_copies.items()), dtype=np.int64).reshape(-1, 2),
+        **(_of_cells(states) if isinstance(states, Cells) else {}),
         evidence=np.array(json.dumps(evidence, default=plain_json, sort_keys=True)),
     )  # fmt: skip
     os.replace(beside, path)
@@ -120,8 +125,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
     )  # fmt: skip
     entries = found["entries"] if found["entries"].size == mdp.P.nnz else None
     payments = Payments(found["mean"], found["deviation"], entries, float(found["largest"]))
-    copies = {int(row): int(copy) for row, copy in found["copies"]}
-    states = ListedStates(space, found["numbers"], copies) if found["numbers"].size else StateIndex(space, copies)
+    states = _numbering(found, space)
     if states.n_states != mdp.n_states:
         raise InvalidMDP(f"the table has {mdp.n_states} states and a numbering of {states.n_states}: expected as many.")
     evidence = json.loads(str(found["evidence"]))
@@ -129,3 +133,38 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space) -> Tabulation:
         evidence[name] = None if evidence.get(name) is None else kind(**evidence[name])
     reward = TabularReward(found["reward"], {"source": "environment"})
     return Tabulation(mdp, reward, payments, states, Evidence(**evidence))
+
+
+SHOWING: dict[str, type[Coordinates]] = {kind.__name__: kind for kind in (Coordinates, IntegerCoordinate, CircularCoordinates)}
+"""How observations show coordinates, by the name that a file has for it: no class is looked up elsewhere."""
+
+
+def _kept(states: Any) -> TypeGuard[StateIndex | ListedStates | Cells]:
+    """Can a file hold this numbering?"""
+    known = isinstance(states, Cells) and type(states.coordinates) in SHOWING.values()
+    return known or isinstance(states, StateIndex | ListedStates)
+
+
+def _of_cells(cells: Cells) -> dict[str, np.ndarray]:
+    """What a file holds of a grid, but for its terminal copies and its space."""
+    shown = cells.coordinates
+    arrays = {"names": np.array(shown.names), "low": shown.low, "high": shown.high, "periodic": shown.periodic}
+    return {f"cells.{name}": one for name, one in arrays.items()} | {
+        "cells.bins": cells.shape, "cells.shown": np.array(type(shown).__name__)
+    }  # fmt: skip
+
+
+def _numbering(found: dict[str, np.ndarray], space: spaces.Space) -> StateIndex | ListedStates | Cells:
+    """The rows' numbering."""
+    if "cells.shown" in found:
+        names, low, high, periodic, bins, shown = (
+            found[f"cells.{name}"] for name in ("names", "low", "high", "periodic", "bins", "shown")
+        )
+        coordinates = SHOWING[str(shown)](space, tuple(map(str, names)), low, high, periodic)
+        cells = Cells(coordinates, bins.tolist(), found["copies"][:, 0])
+        last, rising = cells.n_cells - 1, bool((np.diff(cells.ending, prepend=-1) > 0).all())
+        if not rising or cells.ending.max(initial=0) > last or cells.decode(0).shape != (space.shape or ()):
+            raise InvalidMDP(f"cells of {space} end in {cells.ending[:9]}: expected increasing numbers, 0 to {last}.")
+        return cells
+    copies = {int(row): int(copy) for row, copy in found["copies"]}
+    return ListedStates(space, found["numbers"], copies) if found["numbers"].size else StateIndex(space, copies)

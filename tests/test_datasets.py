@@ -10,7 +10,7 @@ import tiny_env
 from gymnasium import spaces
 from minari.data_collector import EpisodeBuffer
 
-from irl_gym.datasets import load_minari, minari_root, read_minari, recorded_environment, write_minari
+from irl_gym.datasets import load_minari, minari_root, read_minari, write_minari
 from irl_gym.demonstrations import Episode, collect
 from irl_gym.errors import (
     DatasetExists,
@@ -22,6 +22,7 @@ from irl_gym.errors import (
     UnknownEnvironment,
 )
 from irl_gym.policies import TabularPolicy
+from irl_gym.recorded import recorded_environment
 from irl_gym.states import StateIndex
 
 ID = "irl_gym/lake-expert-v0"

@@ -19,7 +19,7 @@ import pytest
 from stopped import HANG
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("wrap-any-environment", "bring-your-own-demonstrations", "reward-distances", "ambiguity", "doctor")
+PAGES = ("wrap-any-environment", "bring-your-own-demonstrations", "reward-distances", "ambiguity", "doctor", "security")
 SCRIPTS = ("recover_and_retrain.py", "export_dataset.py", "play.py", "reward_distances.py", "measure_ambiguity.py", "doctor.py")
 HELP = """
 import contextlib, runpy, sys

@@ -95,6 +95,13 @@ TRAJECTORIES = ("table, trajectories", "cells, trajectories", "dataset, trajecto
 # --- what a run leaves and finds ---
 
 
+def test_a_run_of_cells_is_read_without_making_its_environment(runs, monkeypatch):
+    out = runs("cells, features").out
+    monkeypatch.setattr(gym, "make", None)
+    run = read_run(out)
+    assert run.table.states.bins == (20, 20) and run.state_name(0) and run.tabular.values.shape == (run.table.mdp.n_states,)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_run_leaves_its_files(runs, name):
     agent = {"agent.zip"} if name in STEPPED else {"agent_policy.npz"}

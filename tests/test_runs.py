@@ -5,22 +5,27 @@ import json
 import shlex
 import shutil
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from tiny_env import TableEnv, lottery
 
+from irl_gym.claims import write_environment
 from irl_gym.curves import Curve, read_curve, sampled_returns, write_curve
 from irl_gym.errors import RunConflict, RunIncomplete, RunNewer
 from irl_gym.experiment import Experiment
 from irl_gym.layouts import grid_layout
+from irl_gym.linear_reward import load_reward
 from irl_gym.loop import Loop
 from irl_gym.metrics import policy_value
 from irl_gym.names import action_names, state_name
+from irl_gym.page.proof import verdict
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run, understood
+from irl_gym.worlds import load_actions
 
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
@@ -68,8 +73,6 @@ def test_a_run_holds_its_map(run):
 
 
 def test_a_map_is_read_as_it_was_written(toy_text):
-    import gymnasium as gym
-
     layout = grid_layout(gym.make("CliffWalking-v1"), toy_text("CliffWalking").mdp)
     again = type(layout).from_json(json.loads(json.dumps(layout.to_json())))
     assert all(np.array_equal(getattr(layout, name), getattr(again, name)) for name in layout.__dataclass_fields__)
@@ -225,6 +228,54 @@ def test_a_format_that_is_no_newer_one_is_refused_without_an_upgrade(copied, tol
         read_run(copied)
 
 
+# --- files that are not the run's own ---
+
+
+def negated(path):
+    one = load_reward(path / "reward.npz")
+    TabularReward(-one.values, one.note).save(path / "reward.npz")
+
+
+def rolled(path):
+    np.savez(path / "expert.npz", actions=np.roll(load_actions(path / "expert.npz"), 1))
+
+
+def discounted(path):
+    with np.load(path / "table.npz") as archive:
+        arrays = dict(archive)
+    np.savez(path / "table.npz", **{**arrays, "gamma": np.array(0.5)})
+
+
+@pytest.mark.parametrize(
+    ("swap", "found"), [(negated, "as recorded"), (rolled, "as recorded"), (discounted, r"gamma 0\.5: expected 0\.99")]
+)
+def test_a_run_whose_files_do_not_bear_out_its_record_is_refused(copied, swap, found):
+    swap(copied)
+    with pytest.raises(RunIncomplete, match=f"table, expert and reward do not bear out its record: .*{found}"):
+        read_run(copied)
+
+
+def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(copied, finished):
+    negated(copied)
+    for name in ("table.npz", "expert.npz", "reward.npz"):
+        (copied / name).unlink()
+    recover_and_retrain(asked(), copied)
+    assert read_run(copied).recomputed and np.array_equal(read_run(copied).learned.values, read_run(finished).learned.values)
+
+
+def test_what_is_said_of_the_expert_is_computed_and_not_read(copied, run):
+    content = read_json(copied / "metrics.json")
+    write_json(copied / "metrics.json", content | {"reward": content["reward"] | {"expert_optimal": False}})
+    assert read_run(copied).metrics["reward"] == run.metrics["reward"] and run.recomputed
+
+
+def test_a_record_that_cannot_be_computed_again_is_told_as_one(copied):
+    content = read_json(copied / "metrics.json")
+    write_json(copied / "metrics.json", content | {"reward": content["reward"] | {"learner": "Theirs"}})
+    run = read_run(copied)
+    assert not run.recomputed and "by the run's own record" in verdict(run)["sentence"]
+
+
 # --- runs of earlier versions ---
 
 
@@ -242,7 +293,10 @@ def older(copied):
     return copied
 
 
-def test_a_run_of_an_earlier_version_is_read_without_what_it_lacks(older):
+def test_a_run_of_an_earlier_version_is_read_once_its_environment_is_named(older):
+    with pytest.raises(RunIncomplete, match=r"no environment\.json.*no environment is made to read a run.*write_environment"):
+        read_run(older)
+    write_environment(older, gym.make("FrozenLake-v1"), "FrozenLake-v1")
     run = read_run(older)
     assert (run.command, run.films, run.grid, run.widths, run.lambda_path) == (None, {}, None, None, None)
     assert np.isnan(run.curve.mean).all() and run.table.mdp.n_states == 16 and run.actions[0] == "left"

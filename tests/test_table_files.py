@@ -14,6 +14,7 @@ from gymnasium import spaces
 from tiny_env import TableEnv, both_ways, lottery
 
 from irl_gym.counting import Interaction
+from irl_gym.discretize import discretize
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.table_files import keep_table, kept_table, load_table, save_table
@@ -138,9 +139,44 @@ def test_a_file_that_is_not_there_is_missing(tmp_path):
 
 def test_states_of_another_numbering_are_refused(table, tmp_path, unchecked):
     other = replace(table("published"), states=object())
-    with pytest.raises(InvalidMDP, match="the states are object: expected a StateIndex or ListedStates"):
+    with pytest.raises(InvalidMDP, match="the states are object: expected a StateIndex, ListedStates, or Cells"):
         save_table(other, tmp_path / "table.npz")
     assert not list(tmp_path.iterdir())
+
+
+CELLS = {"shown": ("MountainCar-v0", (4, 3)), "circular": ("Acrobot-v1", 3), "integer": ("FrozenLake-v1", 16)}
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_a_table_of_cells_comes_back_with_its_numbering(tmp_path, name):
+    env = gym.make(CELLS[name][0])
+    table = discretize(env, gamma=0.9, bins=CELLS[name][1], starts=5)
+    again = load_table(saved(table, tmp_path / "table.npz"), env.observation_space)
+    rows = np.arange(table.mdp.n_states)
+    assert np.array_equal(again.states.decode_batch(rows), table.states.decode_batch(rows))
+    assert again.states.terminal_copies == table.states.terminal_copies and again.states.bins == table.states.bins
+    assert again.evidence == table.evidence and (again.mdp.P != table.mdp.P).nnz == 0
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("shown", "os.system"),
+        ("low", np.zeros(3)),
+        ("bins", [4, 4]),
+        ("bins", [4, -3]),
+        ("names", ["x"]),
+        ("high", [np.inf, 1]),
+    ],
+)
+def test_a_grid_that_contradicts_itself_is_refused(tmp_path, part, value):
+    env = gym.make("MountainCar-v0")
+    path = saved(discretize(env, gamma=0.9, bins=(4, 3), starts=5), tmp_path / "table.npz")
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    np.savez(path, **{**arrays, f"cells.{part}": np.array(value)})
+    with pytest.raises(InvalidMDP):
+        load_table(path, env.observation_space)
 
 
 class Bomb:

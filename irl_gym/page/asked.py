@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from irl_gym.claims import flag_of, into_folder
+from irl_gym.claims import flag_of, into_folder, ours
 from irl_gym.page.again import NOT_HERE, defaults, is_part, missing, python_lines, usual
 from irl_gym.page.sections import Section
 from irl_gym.runs import Run
@@ -34,6 +34,8 @@ def reproduce(run: Run) -> Section:
             "In the environment where irl_gym is installed this command makes the same run again, in a folder of its own: the "
             "same seed gives the same files."
         )
+        if not ours(run.version["command"]):
+            lead = "The run notes this command, which is of another program than irl_gym: look at it before you run it."
         again = shlex.join(into_folder(run.version["command"]))
         return Section("reproduce", title, lead, (), "command", {"command": again})
     lead = (

@@ -122,7 +122,8 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
     for name, key in compared.DISTANCES.items():
         if reward.get(key) is not None:
             yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
-    yield "expert optimal under the reward", answer(reward["expert_optimal"])
+    whose = "" if run.recomputed else ", as recorded"
+    yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
     if told["retrained"]["score"] is not None:
         steps = run.metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
@@ -219,7 +220,7 @@ def _proofs(named: Mapping[str, Run]) -> Section:
     margins = [np.array([one for one in cert.get("margin", []) if one is not None], dtype=float) for cert in held]
     if any(one.size for one in margins):
         rows.append(["margins", *(panels.spread(one) if one.size else NONE for one in margins)])
-    return _table("certificate", "Certificates", "What each learned reward proves.", named, rows)
+    return _table("certificate", "Certificates", "What each run recorded of its reward as it learned it.", named, rows)
 
 
 def _proof(held: Mapping[str, Any], key: str) -> str:

@@ -12,7 +12,7 @@ from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, seconds, sentence_of, sum_of
+from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
 from irl_gym.runs import Run
 from irl_gym.sampling_error import estimated_table
 from irl_gym.scores import score_of
@@ -22,10 +22,6 @@ UNKNOWN = "one episode tells no noise"
 """In place of a standard error that there is none of."""
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
-STAGES_LEAD = (
-    "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
-    "neither is timed here."
-)
 
 
 def verdict(run: Run) -> dict[str, Any]:
@@ -56,7 +52,7 @@ def verdict(run: Run) -> dict[str, Any]:
         {
             "label": "expert optimal under it",
             "value": answer(optimal),
-            "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward),
+            "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward, run.recomputed),
             "mood": _mood(optimal, reward),
         },
     ]
@@ -97,13 +93,18 @@ def _no_score(run: Run) -> str:
     return str(run.metrics.get("score_reason") or "the expert earns no more than random actions")
 
 
-def _proved(reward: Mapping[str, Any]) -> str:
-    gap = reward.get("duality_gap")
+def _proved(reward: Mapping[str, Any], recomputed: bool) -> str:
+    gap, whose = reward.get("duality_gap"), whence(recomputed)
     if gap is None:
-        return "recomputed, not taken from the solver"
+        return whose
     if gap <= ROUNDING * max(1.0, abs(reward.get("objective") or 0.0)):
-        return "and to rounding no reward does better in the program"
-    return f"the program's optimum is at most {number(gap, 2)} away"
+        return f"{whose}; to rounding no reward does better in the program, as recorded"
+    return f"{whose}; the program's optimum is at most {number(gap, 2)} away, as recorded"
+
+
+def whence(recomputed: bool) -> str:
+    """Whose word it is that the expert is optimal, or not."""
+    return "computed again for this page" if recomputed else "the run's own record"
 
 
 def _sentence(run: Run, score: float | None, share: float | None, optimal: bool | None) -> str:
@@ -127,6 +128,7 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool 
     certified = "whether the expert is optimal under it is undecided"
     if optimal is not None:
         certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
+    certified += "" if run.recomputed else ", by the run's own record"
     return f"{earned}{tie}; {certified}.{_counted(run)}"
 
 
@@ -144,11 +146,20 @@ def _counted(run: Run) -> str:
 def certificate(run: Run) -> Section:
     """What the learned reward proves, line by line, and the raw numbers behind it."""
     raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
-    lead = "Recomputed from the table, the expert and the reward alone; nothing is taken from the solver's word."
+    lead = (
+        "The run's record, which it computed from the table, the expert and the reward alone, not taken from the solver's word."
+    )
+    if run.recomputed:
+        lead = (
+            "Whether the expert is optimal was computed again for this page, from the table, the expert and the reward in the "
+            "run's folder; the rest is the run's record, which it computed from them, not taken from the solver."
+        )
     if run.metrics["reward"].get("loss_share") is not None:
         lead = f"{lead} {AT_STAKE}"
     if run.table is None:
-        lead = "Recomputed from the sampled trajectories and the reward alone; nothing is taken from the solver's word."
+        lead = (
+            "The run's record, which it computed from the sampled trajectories and the reward alone, not taken from the solver."
+        )
     shown = {"lines": list(_lines(run)), "raw": raw}
     return Section("certificate", "Certificate", lead, (), "certificate", shown)
 
@@ -251,17 +262,6 @@ def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
         "sentence": sentence if run.table is None else with_names(sentence, run.state_name, run.actions),
         "mend": f"{mend} On the command line: {', '.join(flags)}." if flags else mend,
     }
-
-
-def stages(run: Run) -> Section:
-    """How long each stage took. Of these the page of the same run differs from machine to machine, and of nothing else."""
-    rows = []
-    for name, record in run.stages.items():
-        if name == "report":  # it is being written
-            continue
-        steps = record.get("environment_steps", 0)
-        rows.append((name, seconds(record.get("seconds")), f"{steps:,}" if steps else ""))
-    return Section("stages", "Stages", STAGES_LEAD, (), "stages", {"rows": rows})
 
 
 def table_facts(run: Run) -> Section:

@@ -11,14 +11,18 @@ from typing import Any
 from irl_gym.page import compared, episodes, slider, training
 from irl_gym.page.asked import asked, reproduce
 from irl_gym.page.document import write_page
-from irl_gym.page.proof import certificate, doctor, stages, table_facts, verdict
+from irl_gym.page.proof import certificate, doctor, table_facts, verdict
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.written import interval, number, percent
+from irl_gym.page.written import interval, number, percent, seconds
 from irl_gym.runs import Run
 from irl_gym.scores import score_of
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
+STAGES_LEAD = (
+    "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
+    "neither is timed here."
+)
 
 
 def write_report(run: Run, path: str | os.PathLike) -> None:
@@ -53,6 +57,17 @@ def _of_states(scene: Scene) -> tuple[list[Section], dict[str, Any] | None]:
     """What is known state by state, and what the slider shows."""
     path, data = slider.lambda_slider(scene)
     return [compared.values(scene), compared.policies(scene), path, training.widths(scene)], data
+
+
+def stages(run: Run) -> Section:
+    """How long each stage took. Of these the page of the same run differs from machine to machine, and of nothing else."""
+    rows = []
+    for name, record in run.stages.items():
+        if name == "report":  # it is being written
+            continue
+        steps = record.get("environment_steps", 0)
+        rows.append((name, seconds(record.get("seconds")), f"{steps:,}" if steps else ""))
+    return Section("stages", "Stages", STAGES_LEAD, (), "stages", {"rows": rows})
 
 
 def page_title(run: Run) -> str:

@@ -57,7 +57,7 @@ def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=
         grid=layout,
         films=films_of(env, env_id, table, result.reward, {"expert": expert, "agent": agent}, seed, frames) if films else {},
         diagnosis=diagnosis_of(acting), widths=widths_of(table, result.reward),
-        lambda_path=path_of(mdp, expert, reward_on) if reward_on == "state" else None,
+        lambda_path=path_of(mdp, expert, reward_on) if reward_on == "state" else None, recomputed=True,
     )  # fmt: skip
 
 

@@ -15,8 +15,10 @@ from irl_gym.demonstrations import empirical_policy
 from irl_gym.diagnoses.case import Case
 from irl_gym.errors import IrlGymError
 from irl_gym.linear_reward import LinearReward, load_reward
-from irl_gym.rewards import UNREADABLE, TabularReward
+from irl_gym.policies import load_actions
+from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
+from irl_gym.runs import SURPRISES
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 
@@ -30,7 +32,7 @@ def left_behind(path: Path) -> Case | None:
         record = _maybe(path / RECORDS / "reward.json")
         learned = load_reward(path / "reward.npz") if record else None
         expert = _expert(path, config, table)
-    except (*UNREADABLE, IrlGymError):
+    except (OSError, *SURPRISES, IrlGymError):
         return None
     claims = _maybe(path / "certificate.json") if record else {}
     reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
@@ -49,8 +51,7 @@ def _maybe(path: Path) -> dict[str, Any]:
 def _expert(path: Path, config: dict[str, Any], table: Tabulation) -> np.ndarray:
     if config.get("epsilon"):
         return seen_with_noise(path, table)
-    with np.load(path / "expert.npz", allow_pickle=False) as archive:
-        return archive["actions"]
+    return load_actions(path / "expert.npz")
 
 
 def seen_with_noise(path: Path, table: Tabulation) -> np.ndarray:

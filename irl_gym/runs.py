@@ -3,7 +3,6 @@ Axes: S states, A actions, n points of the learning curve, k pieces of the lambd
 """
 
 import contextlib
-import json
 import os
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from minari.serialization import deserialize_space
 
 from irl_gym.archives import json_in, read_arrays
 from irl_gym.choices import environment_of
@@ -30,6 +28,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+from irl_gym.told_spaces import told_space
 
 SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
 """What is raised by content that no run leaves."""
@@ -239,7 +238,7 @@ def _environment(reader: _Reader, config: Mapping[str, Any]) -> tuple[str | None
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
     content = read_json(path)
-    return content["id"], deserialize_space(json.loads(content["observations"])), tuple(content["actions"])
+    return content["id"], told_space("observations", content["observations"]), tuple(map(str, content["actions"]))
 
 
 def _made(config: Mapping[str, Any]) -> Any:

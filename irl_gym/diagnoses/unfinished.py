@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from minari.serialization import deserialize_space
 
 from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent
@@ -21,13 +20,14 @@ from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.runs import SURPRISES
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+from irl_gym.told_spaces import told_space
 
 
 def left_behind(path: Path) -> Case | None:
     """The case that a folder's files make; None where they are not enough, or cannot be read."""
     try:
         config = read_json(path / "config.json")
-        space = deserialize_space(read_json(path / "environment.json")["observations"])
+        space = told_space("observations", read_json(path / "environment.json")["observations"])
         table = load_table(path / TABLE, space)
         record = _maybe(path / RECORDS / "reward.json")
         learned = load_reward(path / "reward.npz") if record else None

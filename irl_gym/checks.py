@@ -1,9 +1,10 @@
-"""Checks of arguments that many places share: a number in a range, an array of floats."""
+"""Checks of arguments that many places share: a number in a range, an array of floats, a sparse matrix."""
 
 import numbers
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from irl_gym.errors import InvalidInput, InvalidParameter
 
@@ -59,6 +60,75 @@ def checked_rng(rng: Any) -> np.random.Generator:
     raise InvalidParameter(f"rng is {rng!r}: expected a generator. Make one of a seed: `np.random.default_rng(0)`.")
 
 
+def checked_csr(
+    data: Any, indices: Any, indptr: Any, shape: tuple[int, int], name: str, error: type[InvalidInput]
+) -> sp.csr_array:
+    """A sparse matrix of its parts, which SciPy's own code believes: it reads, and writes, wherever they say.
+
+    Args:
+        data: (nnz,) real numbers.
+        indices: (nnz,) whole numbers, the column of each.
+        indptr: (rows + 1,) whole numbers, where each row begins among them, and nnz.
+        shape: rows and columns.
+        name: what the matrix is called.
+        error: raised when it is none.
+
+    Raises:
+        InvalidInput: of the class given; naming the part and the first value that cannot be.
+    """
+    _check_parts(data, indices, indptr, shape, name, error)
+    return sp.csr_array((data, indices, indptr), shape=shape, dtype=np.float64)
+
+
+def sparse_copy(name: str, matrix: Any, error: type[InvalidInput]) -> sp.csr_array:
+    """A copy of any sparse matrix of SciPy's as CSR with float64, once its structure is known to be whole.
+
+    Raises:
+        InvalidInput: of the class given, for a matrix that is damaged, has other than two axes, or holds no real numbers.
+    """
+    if matrix.ndim != 2 or matrix.dtype.kind not in "biuf":
+        raise error(f"{name} has shape {matrix.shape} and dtype {matrix.dtype}: expected real numbers along two axes.")
+    if matrix.format == "coo":
+        data, inside = matrix.data, True
+        for places, n in zip(matrix.coords, matrix.shape, strict=True):
+            fits = places.dtype.kind in "iu" and places.shape == data.shape == (data.size,)
+            inside &= bool(fits and ((places >= 0) & (places < n)).all())
+        if not inside:
+            raise error(f"{name} has entries outside its shape {matrix.shape}: expected two places inside for each.")
+    elif matrix.format in ("csc", "bsr"):
+        height, width = matrix.data.shape[1:] if matrix.format == "bsr" else (1, 1)
+        rows, columns = matrix.shape[0] // max(height, 1), matrix.shape[1] // max(width, 1)
+        shape = (rows, columns) if matrix.format == "bsr" else (columns, rows)
+        _check_parts(matrix.data.reshape(len(matrix.data), -1)[:, 0], matrix.indices, matrix.indptr, shape, name, error)
+    elif matrix.format == "csr":
+        _check_parts(matrix.data, matrix.indices, matrix.indptr, matrix.shape, name, error)
+    csr = sp.csr_array(matrix, copy=True)
+    if matrix.format not in ("csr", "csc", "bsr", "coo"):  # lists, dictionaries and diagonals
+        _check_parts(csr.data, csr.indices, csr.indptr, csr.shape, name, error)
+    return csr.astype(np.float64, copy=False)
+
+
+def _check_parts(data: Any, indices: Any, indptr: Any, shape: Any, name: str, error: type[InvalidInput]) -> None:
+    """The structure of a matrix whose rows (or columns, or rows of blocks) are compressed: `shape` begins with these."""
+    for part, array, kinds in (("data", data, "biuf"), ("indices", indices, "iu"), ("indptr", indptr, "iu")):
+        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind not in kinds:
+            found = f"shape {np.shape(array)} and dtype {getattr(array, 'dtype', type(array).__name__)}"
+            raise error(f"{name}.{part} has {found}: expected {'real' if kinds == 'biuf' else 'whole'} numbers along one axis.")
+    if len(indptr) != shape[0] + 1 or indptr[0] != 0 or not indptr[-1] == len(indices) == len(data):
+        span = f" from {indptr[0]} to {indptr[-1]}" if len(indptr) else ""
+        raise error(
+            f"{name} has {len(data)} numbers, {len(indices)} indices and {len(indptr)} pointers{span}: expected an index for "
+            f"each number, and {shape[0] + 1} pointers from 0 to as many. `prune()` drops numbers that no pointer reaches."
+        )
+    falls = np.flatnonzero(indptr[1:] < indptr[:-1])
+    if falls.size:
+        at = int(falls[0])
+        raise error(f"{name}.indptr[{at + 1}] is {indptr[at + 1]}, after {indptr[at]}: expected pointers that never fall.")
+    wrong = np.flatnonzero((indices < 0) | (indices >= shape[1]))
+    if wrong.size:
+        raise error(f"{name}.indices[{wrong[0]}] is {indices[wrong[0]]}: expected 0 to {shape[1] - 1}.")
+
+
 def float_array(name: str, value: Any, expected: str, error: type[InvalidInput]) -> np.ndarray:
     """Return an array-like as a new float64 array.
 
@@ -69,7 +139,7 @@ def float_array(name: str, value: Any, expected: str, error: type[InvalidInput])
         if np.iscomplexobj(value):
             raise TypeError("complex numbers")  # NumPy would drop the imaginary part
         return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as reason:
+    except (TypeError, ValueError, OverflowError, RecursionError) as reason:  # 10**400, a list within itself
         raise error(
             f"{name} is {type(value).__name__} that cannot be read as numbers ({reason}): expected {expected}."
         ) from reason

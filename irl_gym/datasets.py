@@ -20,6 +20,7 @@ from gymnasium import spaces
 from minari.dataset.minari_storage import MinariStorage
 from minari.storage.datasets_root_dir import get_dataset_path
 
+from irl_gym.dataset_files import check_episode, check_episodes, check_told
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import (
     DatasetMismatch,
@@ -28,13 +29,12 @@ from irl_gym.errors import (
     InvalidParameter,
     NotDiscrete,
 )
+from irl_gym.hdf5_files import BROKEN
 from irl_gym.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.minari_formats import DataFormat
 from irl_gym.states import States
 
 _ROOT = "MINARI_DATASETS_PATH"
-_BROKEN = (OSError, ValueError, KeyError, TypeError, AttributeError, AssertionError, RuntimeError)
-"""What Minari and h5py raise on files that are missing, cut off, or not a dataset's."""
 
 
 @contextlib.contextmanager
@@ -171,9 +171,10 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
                 "folder, or set MINARI_DATASETS_PATH."
             )
         try:
+            check_told(base / dataset_id / "data")
             _check_told(dataset_id, MinariStorage.read_raw_metadata(base / dataset_id / "data"))
             return minari.load_dataset(dataset_id)
-        except _BROKEN as error:
+        except BROKEN as error:
             raise _broken(dataset_id, error) from error
 
 
@@ -254,11 +255,14 @@ def read_minari(
 
 
 def _stored(dataset: minari.MinariDataset) -> Iterator[tuple[Any, Any]]:
-    """Episodes and their metadata, as Minari gives them."""
+    """Episodes and their metadata, as Minari gives them, once their files are known to be sound."""
     try:
+        check_episodes(Path(dataset.storage.data_path), dataset.storage.FORMAT, map(int, dataset.episode_indices))
         metadatas = dataset.storage.get_episode_metadata(dataset.episode_indices)
-        yield from zip(dataset.iterate_episodes(), metadatas, strict=True)
-    except _BROKEN as error:
+        for episode, metadata in zip(dataset.iterate_episodes(), metadatas, strict=True):
+            check_episode(episode, metadata, dataset.spec.observation_space, dataset.spec.action_space)
+            yield episode, metadata
+    except BROKEN as error:
         raise _broken(dataset.spec.dataset_id, error) from error
 
 

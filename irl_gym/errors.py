@@ -8,6 +8,7 @@ IrlGymError
 │   ├── InvalidReward          wrong shape, NaN, a file that holds no reward
 │   ├── InvalidFeatures        features with NaN, of the wrong length, or of other observations
 │   ├── InvalidParameter       a hyper-parameter outside its range
+│   ├── DamagedFile            a file that was cut off or changed, or that declares more than it can hold
 │   ├── UnknownObservation     an observation that the state index does not hold
 │   └── InvalidDemonstrations  episodes that no environment could have produced
 ├── UnknownEnvironment         an id that is not registered; the closest names are offered
@@ -68,6 +69,10 @@ class InvalidFeatures(InvalidInput):
 
 class InvalidParameter(InvalidInput):
     """A hyper-parameter outside its range."""
+
+
+class DamagedFile(InvalidInput):
+    """A file that was cut off or changed, that leads elsewhere, or that declares more than it can hold."""
 
 
 class UnknownObservation(InvalidInput):

@@ -8,9 +8,7 @@ one observation and for batches, and its actions count from 0, whatever number t
 Axes: S states, A actions, N observations.
 """
 
-import json
 import os
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,11 +23,12 @@ from stable_baselines3.common.distributions import CategoricalDistribution
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from irl_gym._typing import Matrix
-from irl_gym.errors import InvalidParameter, InvalidPolicy, NotDiscrete
+from irl_gym.archives import read_settings
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy, NotDiscrete
 from irl_gym.features import batch_size, take
 from irl_gym.noise import boltzmann, checked_count, checked_temperature
 from irl_gym.planners import Agent, Algorithm, load_agent
-from irl_gym.policies import Policy, as_distribution, generator
+from irl_gym.policies import Policy, generator, load_actions
 from irl_gym.states import States
 
 
@@ -201,17 +200,14 @@ def load_expert(
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist: expected an agent's zip, as SB3 writes it, or a table's npz.")
     try:
-        with zipfile.ZipFile(path) as archive:
-            names = set(archive.namelist())
-            settings = json.loads(archive.read("data")) if "data" in names else None
-    except (OSError, zipfile.BadZipFile, ValueError, RuntimeError) as error:
+        names, settings = read_settings(path, "data")
+    except (DamagedFile, OSError) as error:
         raise InvalidParameter(f"{path} holds no expert ({error}): expected SB3's zip of an agent, or an npz.") from error
     if any(name.endswith(".npy") for name in names):
-        return _table(path)
+        return load_actions(path)
     if not isinstance(settings, dict):
         raise InvalidParameter(
-            f"{path} holds {sorted(names)[:3]}: expected SB3's zip of an agent, or an npz with `actions`. Save it "
-            "with `model.save`."
+            f"{path} holds {names[:3]}: expected SB3's zip of an agent, or an npz with `actions`. Save it with `model.save`."
         )
     maker = _maker(settings)
     algorithm = algorithm or maker
@@ -244,22 +240,3 @@ def _check_discrete(agent: Agent) -> None:
     space = agent.model.action_space
     if not isinstance(space, spaces.Discrete):
         raise NotDiscrete(f"the agent's actions are {space}: expected Discrete. Train it on Gymnasium's DiscretizeAction.")
-
-
-def _table(path: Path) -> np.ndarray:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            names = [name for name in ("actions", "probabilities") if name in archive.files]
-            if len(names) != 1:
-                raise InvalidParameter(f"{path} holds {sorted(archive.files)}: expected `actions`, or else `probabilities`.")
-            table = archive[names[0]]
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, InvalidParameter):
-            raise
-        raise InvalidParameter(f"{path} cannot be read as a table ({error}): expected an npz of numbers.") from error
-    if table.ndim not in (1, 2) or table.size == 0:
-        raise InvalidPolicy(f"{path} has a table of shape {table.shape}: expected (S,) actions or (S, A) probabilities.")
-    width = table.shape[1] if table.ndim == 2 else int(np.max(table, initial=0)) + 1 if table.dtype.kind in "iu" else 1
-    known = ~np.isnan(table).all(axis=1) if table.ndim == 2 and table.dtype.kind == "f" else np.ones(len(table), dtype=bool)
-    as_distribution(table[known], int(known.sum()), width)  # refuses what is no policy
-    return table

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import breadth_first_order
 
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import checked_number, float_array, sparse_copy
 from irl_gym.errors import InvalidDiscount, InvalidMDP
 from irl_gym.policies import as_distribution, policy_array
 
@@ -45,7 +45,7 @@ class TransitionTable:
         self.d0: Vector = _frozen(float_array("d0", d0, "(S,) probabilities", InvalidMDP))
         self.n_states: int = self.P.shape[1]
         _check_start(self.d0, self.n_states)
-        if self.P.shape[0] == 0 or self.P.shape[0] % self.n_states:
+        if 0 in self.P.shape or self.P.shape[0] % self.n_states:
             raise InvalidMDP(
                 f"P has shape {self.P.shape}: expected (S*A, S), {self.n_states} states times the number of actions rows."
             )
@@ -63,8 +63,8 @@ class TransitionTable:
     def from_dense(cls, P: Any, *args: Any, **kwargs: Any):
         """Make a table from a dense array of shape (S, A, S); the other arguments are the constructor's."""
         array = float_array("P", P, "(S, A, S) probabilities", InvalidMDP)
-        if array.ndim != 3 or array.shape[0] != array.shape[2]:
-            raise InvalidMDP(f"P has shape {array.shape}: expected (S, A, S).")
+        if array.ndim != 3 or array.shape[0] != array.shape[2] or 0 in array.shape:
+            raise InvalidMDP(f"P has shape {array.shape}: expected (S, A, S), at least one state and one action.")
         return cls(array.reshape(-1, array.shape[2]), *args, **kwargs)
 
     def __reduce__(self) -> tuple:
@@ -191,7 +191,7 @@ def _frozen_csr(P: Any) -> Sparse:
         P = float_array("P", P, "(S*A, S) probabilities", InvalidMDP)
         if P.ndim != 2:
             raise InvalidMDP(f"P has shape {P.shape}: expected (S*A, S). For an (S, A, S) array use `from_dense`.")
-    csr: Any = sp.csr_array(P, dtype=np.float64, copy=True)
+    csr: Any = sparse_copy("P", P, InvalidMDP) if sp.issparse(P) else sp.csr_array(P)
     csr.sum_duplicates()
     csr.eliminate_zeros()
     for part in (csr.data, csr.indices, csr.indptr):
@@ -234,7 +234,10 @@ def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
 
 
 def _checked_visits(visits: Any, shape: tuple[int, int]) -> np.ndarray:
-    array = np.array(visits)
+    try:
+        array = np.array(visits)
+    except ValueError as error:
+        raise InvalidMDP(f"visits are rows of several lengths: expected {shape} whole numbers.") from error
     if array.shape != shape or array.dtype.kind not in "iu" or (array < 0).any():
         raise InvalidMDP(
             f"visits has shape {array.shape} and dtype {array.dtype}: expected {shape} whole numbers of at least 0, the steps "

@@ -7,14 +7,16 @@ Three ways to write a tabular policy, and everything that takes one takes all th
 Axes: S states, A actions.
 """
 
+import os
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
+from irl_gym.archives import read_arrays
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidPolicy
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
 from irl_gym.states import States
 
 ACTIONS = 1
@@ -101,6 +103,38 @@ def _checked_probabilities(array: np.ndarray) -> np.ndarray:
         raise InvalidPolicy(f"policy[s={wrong[0]}] sums to {sums[wrong[0]]:.9g}: each row must sum to 1. Normalise it.")
     off = np.abs(sums - 1) > ROUNDING
     return np.where(off[:, None], array / sums[:, None], array).astype(np.float64)
+
+
+def load_actions(path: str | os.PathLike) -> np.ndarray:
+    """A policy that a run, or anybody, kept in an npz: `actions`, or else `probabilities`. Rows of NaN, of which nothing was
+    known, stay.
+
+    Raises:
+        FileNotFoundError: no such file.
+        InvalidParameter: a file that cannot be read, or holds neither, or both.
+        InvalidPolicy: a table that is no policy.
+    """
+    try:
+        found = read_arrays(path)
+    except FileNotFoundError:
+        raise
+    except (DamagedFile, OSError) as error:
+        raise InvalidParameter(f"{path} cannot be read as a table ({error}): expected an npz of numbers.") from error
+    names = [name for name in ("actions", "probabilities") if name in found]
+    if len(names) != 1:
+        raise InvalidParameter(f"{path} holds {sorted(found)[:9]}: expected `actions`, or else `probabilities`.")
+    table = found[names[0]]
+    if table.ndim not in (1, 2) or table.size == 0:
+        raise InvalidPolicy(f"{path} has a table of shape {table.shape}: expected (S,) actions or (S, A) probabilities.")
+    width = table.shape[1] if table.ndim == 2 else 0
+    known = ~np.isnan(table).all(axis=1) if table.ndim == 2 and table.dtype.kind == "f" else np.ones(len(table), dtype=bool)
+    if table.ndim == 1 and table.dtype.kind in "iu":  # how many actions there are, the file does not say
+        if table.min() < 0:
+            s = int(np.argmax(table < 0))
+            raise InvalidPolicy(f"policy[s={s}] is action {table[s]}, in {path}: expected an action of at least 0.")
+    else:
+        as_distribution(table[known], int(known.sum()), width)  # refuses what is no policy
+    return table
 
 
 def support(policy: Any, n_states: int, n_actions: int) -> ActionSets:

@@ -7,9 +7,6 @@ greedy for both, and a terminal goal is paid exactly once. A reward on steps (S,
 
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,18 +15,14 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import Matrix
+from irl_gym.archives import json_in, read_arrays
 from irl_gym.checks import checked_number, float_array
-from irl_gym.errors import InvalidReward
+from irl_gym.errors import DamagedFile, InvalidReward
 from irl_gym.mdp import TransitionTable
 
 FORMAT = "irl_gym.TabularReward/1"
 SOLVED_WITHIN = 1e-6
 """Share of the largest |R| that solvers of linear programs leave of differences of action values."""
-UNREADABLE = (
-    ValueError, KeyError, EOFError, TypeError, RuntimeError, OSError, AttributeError, struct.error, zipfile.BadZipFile,
-    zlib.error,
-)  # fmt: skip
-"""What `np.load` and json raise of a file that is damaged, or is something else."""
 
 
 @runtime_checkable
@@ -171,31 +164,24 @@ def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dic
     what = "reward" if all(kind.endswith("Reward") for kind in kinds) else " or ".join(kinds)
     saved = f"a file that {' or '.join(f'{kind}.save' for kind in kinds)} wrote"
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:  # NumPy would leave a broken zip open
-            header = json.loads(str(archive["header"]))
-            arrays = {name: archive[name] for name in archive.files if name != "header"}
+        arrays = read_arrays(path)
+        header = json_in(arrays, "header")
     except FileNotFoundError as error:
         told = f"{path} does not exist: expected {saved}. Save one there, or name another file."
         raise FileNotFoundError(told) from error
-    except UNREADABLE as error:
-        raise InvalidReward(f"{path} holds no {what} ({_damage(path, error)}): expected {saved}.") from error
-    if not isinstance(header, dict) or header.get("format") not in formats:
+    except (DamagedFile, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InvalidReward(f"{path} holds no {what} ({why}): expected {saved}.") from error
+    if not isinstance(header, dict) or not isinstance(header.get("format"), str) or header["format"] not in formats:
         raise _another_format(path, header, formats)
-    return header, arrays
+    if not isinstance(header.get("note", {}), dict):
+        raise InvalidReward(f"{path} has the note {header['note']!r:.80}: expected an object, in {saved}.")
+    return header, {name: one for name, one in arrays.items() if name != "header"}
 
 
 def _kind(file_format: str) -> str:
     """The class that a format is of: TabularReward of irl_gym.TabularReward/1."""
     return file_format.removeprefix("irl_gym.").partition("/")[0]
-
-
-def _damage(path: str | os.PathLike, error: Exception) -> str:
-    """Why an archive cannot be read; NumPy's own words would advise to unpickle what is no archive."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    if not zipfile.is_zipfile(path):
-        return "it is no npz archive"
-    return "it holds pickled objects, which are never read" if "pickle" in str(error) else str(error)
 
 
 def _another_format(path: str | os.PathLike, header: Any, formats: tuple[str, ...]) -> InvalidReward:
@@ -206,7 +192,7 @@ def _another_format(path: str | os.PathLike, header: Any, formats: tuple[str, ..
         told = f"{path} holds a {kind}: expected a {' or a '.join(kinds)}. Read it with {kind}.load, or name another file."
         return InvalidReward(told)
     expected = " or ".join(map(repr, formats))
-    return InvalidReward(f"{path} has format {found!r}: expected {expected}. Was it written by a newer version?")
+    return InvalidReward(f"{path} has format {found!r:.80}: expected {expected}. Was it written by a newer version?")
 
 
 def as_reward(reward: Any) -> TabularReward:

@@ -3,7 +3,6 @@ Axes: S states, A actions, n points of the learning curve, k pieces of the lambd
 """
 
 import contextlib
-import json
 import os
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -13,8 +12,8 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from minari.serialization import deserialize_space
 
+from irl_gym.archives import json_in, read_arrays
 from irl_gym.claims import AGAIN, ENVIRONMENT, FIRST, STAGES, check_format, into_folder, ours, shell_command
 from irl_gym.curves import Curve, read_curve
 from irl_gym.errors import InvalidInput, IrlGymError, RunIncomplete
@@ -22,10 +21,12 @@ from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.names import state_name
+from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+from irl_gym.told_spaces import told_space
 from irl_gym.verified import recomputed
 
 SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
@@ -134,16 +135,16 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
         learned=reader.read("reward.npz", load_reward),
-        expert=reader.read("expert.npz", _actions) if on_table else None,
-        agent=reader.read("agent_policy.npz", _actions) if on_table else None,
+        expert=reader.read("expert.npz", load_actions) if on_table else None,
+        agent=reader.read("agent_policy.npz", load_actions) if on_table else None,
         certificate=reader.read("certificate.json", read_json), metrics=metrics,
         curve=reader.read("learning_curve.csv", read_curve), stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
                if (path / "films" / f"{name}.json").exists()},
         diagnosis=reader.maybe("diagnosis.json", read_json),
-        widths=_part(reader.maybe("ambiguity.npz", _arrays), "widths"),
-        lambda_path=_part(reader.maybe("ambiguity.npz", _arrays), "path"),
+        widths=reader.maybe("ambiguity.npz", lambda one: _part(one, "widths")),
+        lambda_path=reader.maybe("ambiguity.npz", lambda one: _part(one, "path")),
     )  # fmt: skip
     _check_shapes(run, reader)
     return _with_proof(run, reader)
@@ -236,7 +237,7 @@ def _environment(reader: _Reader) -> tuple[str | None, spaces.Space, tuple[str, 
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
     content = read_json(path)
-    return content["id"], deserialize_space(json.loads(content["observations"])), tuple(content["actions"])
+    return content["id"], told_space("observations", content["observations"]), tuple(map(str, content["actions"]))
 
 
 def _table(reader: _Reader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:
@@ -285,16 +286,9 @@ def _with_proof(run: Run, reader: _Reader) -> Run:
     return replace(run, metrics={**run.metrics, "reward": told}, recomputed=found is not None)
 
 
-def _actions(path: Path) -> np.ndarray:
-    return _arrays(path)["actions"]
-
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
-
-
-def _part(arrays: Mapping[str, np.ndarray] | None, name: str) -> dict[str, Any] | None:
+def _part(path: Path, name: str) -> dict[str, Any] | None:
     """The arrays whose names begin so; what is text is json."""
-    found = {key.partition(".")[2]: one for key, one in (arrays or {}).items() if key.startswith(f"{name}.")}
-    return {key: json.loads(str(one)) if one.dtype.kind == "U" else one for key, one in found.items()} or None
+    arrays = read_arrays(path)
+    found = {key: one for key, one in arrays.items() if key.startswith(f"{name}.")}
+    told = {key: json_in(arrays, key) if one.dtype.kind == "U" else one for key, one in found.items()}
+    return {key.partition(".")[2]: one for key, one in told.items()} or None

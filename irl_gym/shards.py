@@ -6,11 +6,6 @@ damaged one, and those after it, are set aside under names that end in `.damaged
 Axes: T steps, N episodes of a shard, M = sum of T.
 """
 
-import contextlib
-import errno
-import struct
-import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,17 +13,14 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.archives import read_arrays
 from irl_gym.demonstrations import Episode
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.errors import DamagedFile, InvalidDemonstrations, InvalidParameter
 
 SHARD_BYTES = 4 << 20
 """Of episodes, about: as many are held in memory at a time."""
 NO_SEED = -1
 _BESIDE = ".tmp.npz"
-_DAMAGE = (
-    ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-"""What NumPy and zipfile raise on bytes that are no npz, or not the ones that were written."""
 
 
 class Shards:
@@ -46,7 +38,7 @@ class Shards:
         self.folder, self.space = folder, space
         self.n_episodes, self.n_steps = 0, 0
         self._n_shards = 0
-        while (lengths := _lengths(self._path(self._n_shards))) is not None:
+        while (lengths := _lengths(self._path(self._n_shards), space)) is not None:
             self._n_shards += 1
             self.n_episodes, self.n_steps = self.n_episodes + lengths.size, self.n_steps + int(lengths.sum())
         for path in set(folder.glob("*.npz")) - set(map(self._path, range(self._n_shards))):
@@ -93,7 +85,7 @@ class Shards:
 
     def __iter__(self) -> Iterator[Episode]:
         for number in range(self._n_shards):
-            columns = _columns(self._path(number))
+            columns = self._whole(number)
             step = 0
             for i, length in enumerate(columns["lengths"].tolist()):
                 steps, seen = slice(step, step + length), slice(step + i, step + i + length + 1)
@@ -104,57 +96,68 @@ class Shards:
                 )  # fmt: skip
                 step += length
 
+    def _whole(self, number: int) -> dict[str, np.ndarray]:
+        try:
+            return _columns(self._path(number), self.space)
+        except (FileNotFoundError, DamagedFile) as error:
+            raise InvalidDemonstrations(
+                f"shard {self._path(number)} was damaged since it was opened ({error}): expected the episodes that were "
+                "written. Ask for the same again: its episodes, and those after them, are then made anew."
+            ) from error
+
 
 def size_of(space: spaces.Space, episode: Episode) -> int:
     """Bytes of an episode."""
     return 16 * len(episode) + sum(part.nbytes for _, part in _parts(space, episode.observations))
 
 
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """The archive of a shard.
+def _columns(path: Path, space: spaces.Space) -> dict[str, np.ndarray]:
+    """The columns of a shard, as many rows of each as its lengths say.
 
     Raises:
         FileNotFoundError: there is none.
-        InvalidParameter: it cannot be opened or read now, which says nothing about what is in it.
+        InvalidParameter: it cannot be read now, which says nothing about what is in it.
+        DamagedFile: it is not what was written.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # np.load would leave a broken one open
-            yield archive
+        found = read_arrays(path)
     except FileNotFoundError:
         raise
     except OSError as error:
-        if error.errno == errno.EINVAL:  # zipfile sought a place before the file's start
-            raise zipfile.BadZipFile(str(error)) from error
         raise InvalidParameter(
             f"{path} cannot be read now ({error}): expected a shard of episodes. Nothing is lost; ask again when it can."
         ) from error
+    lengths = found.get("lengths", np.zeros(0))
+    if lengths.ndim != 1 or lengths.dtype.kind not in "iu" or not lengths.size or lengths.min() < 1:
+        raise DamagedFile(
+            f"{path} has lengths of shape {lengths.shape} and dtype {lengths.dtype}: expected (N,) of at least 1."
+        )
+    N, M = lengths.size, sum(lengths.tolist())  # Python's integers do not wrap around
+    rows = {"terminated": ("b", N), "truncated": ("b", N), "seeds": ("iu", N), "actions": ("iu", M), "rewards": ("f", M)}
+    rows |= dict.fromkeys(_names(space), ("biufU", N + M))
+    for name, (kinds, n) in rows.items():
+        if name not in found or found[name].shape[:1] != (n,) or found[name].dtype.kind not in kinds:
+            there = f"of shape {found[name].shape} and dtype {found[name].dtype}" if name in found else "not there"
+            raise DamagedFile(f"{path} has {name} {there}: expected {n} rows.")
+    return found
 
 
-def _lengths(path: Path) -> np.ndarray | None:
+def _lengths(path: Path, space: spaces.Space) -> np.ndarray | None:
     """(N,) steps of the episodes in a shard; None if there is none, or if it is damaged."""
     try:
-        with _opened(path) as archive:
-            return archive["lengths"] if archive.zip.testzip() is None else None
-    except FileNotFoundError:
-        return None
-    except InvalidParameter:  # a ValueError too
-        raise
-    except _DAMAGE:
+        return _columns(path, space)["lengths"]
+    except (FileNotFoundError, DamagedFile):
         return None
 
 
-def _columns(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with _opened(path) as archive:
-            return {name: archive[name] for name in archive.files}
-    except InvalidParameter:
-        raise
-    except (FileNotFoundError, *_DAMAGE) as error:
-        raise InvalidDemonstrations(
-            f"shard {path} was damaged since it was opened ({error}): expected the episodes that were written. Ask for the "
-            "same again: its episodes, and those after them, are then made anew."
-        ) from error
+def _names(space: Any, name: str = "observations") -> Iterator[str]:
+    """What `_parts` calls the arrays that observations of a space are made of."""
+    if isinstance(space, spaces.Dict | spaces.Tuple):
+        inside: Any = space.values() if isinstance(space, spaces.Dict) else space
+        for i, one in enumerate(inside):
+            yield from _names(one, f"{name}.{i}")
+    else:
+        yield name
 
 
 def _parts(space: Any, observations: Any, name: str = "observations") -> Iterator[tuple[str, np.ndarray]]:

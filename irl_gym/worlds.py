@@ -21,7 +21,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
 from irl_gym.noise import Noisy, noisy
 from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
+from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator, load_actions
 from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
@@ -218,9 +218,3 @@ class SteppedWorld:
 def discounted_mean(episodes: list[Episode], gamma: float) -> float:
     """Mean discounted return."""
     return float(np.mean([gamma ** np.arange(len(one)) @ one.rewards for one in episodes]))
-
-
-def load_actions(path: Path) -> np.ndarray:
-    """(S,) actions or (S, A) probabilities that a run kept."""
-    with np.load(path, allow_pickle=False) as archive:
-        return archive["actions"]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from minari.serialization import deserialize_space
 
 from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent
@@ -15,22 +14,25 @@ from irl_gym.demonstrations import empirical_policy
 from irl_gym.diagnoses.case import Case
 from irl_gym.errors import IrlGymError
 from irl_gym.linear_reward import LinearReward, load_reward
-from irl_gym.rewards import UNREADABLE, TabularReward
+from irl_gym.policies import load_actions
+from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
+from irl_gym.runs import SURPRISES
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
+from irl_gym.told_spaces import told_space
 
 
 def left_behind(path: Path) -> Case | None:
     """The case that a folder's files make; None where they are not enough, or cannot be read."""
     try:
         config = read_json(path / "config.json")
-        space = deserialize_space(read_json(path / "environment.json")["observations"])
+        space = told_space("observations", read_json(path / "environment.json")["observations"])
         table = load_table(path / TABLE, space)
         record = _maybe(path / RECORDS / "reward.json")
         learned = load_reward(path / "reward.npz") if record else None
         expert = _expert(path, config, table)
-    except (*UNREADABLE, IrlGymError):
+    except (OSError, *SURPRISES, IrlGymError):
         return None
     claims = _maybe(path / "certificate.json") if record else {}
     reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
@@ -49,8 +51,7 @@ def _maybe(path: Path) -> dict[str, Any]:
 def _expert(path: Path, config: dict[str, Any], table: Tabulation) -> np.ndarray:
     if config.get("epsilon"):
         return seen_with_noise(path, table)
-    with np.load(path / "expert.npz", allow_pickle=False) as archive:
-        return archive["actions"]
+    return load_actions(path / "expert.npz")
 
 
 def seen_with_noise(path: Path, table: Tabulation) -> np.ndarray:

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.errors import EnumerationLimit, RunConflict
-from irl_gym.integer_spaces import keys_of_numbers, numbers_of_keys
-from irl_gym.rewards import UNREADABLE
+from irl_gym.archives import json_in, read_arrays
+from irl_gym.checks import LARGEST
+from irl_gym.errors import DamagedFile, EnumerationLimit, InvalidInput, RunConflict
+from irl_gym.integer_spaces import checked_members, keys_of_numbers, numbers_of_keys, ranges
 
 Script = tuple[int, ...]
 """Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
@@ -33,6 +34,13 @@ COUNTED = {
     "uncompared": "inner states that were not compared, because their steps are counted",
     "truncated": "steps that the environment itself truncated",
 }
+
+PARTS = {
+    "states": "iu", "ends": "iu", "parents": "i", "actions": "i", "script_lengths": "iu", "scripts": "i", "rows": "i",
+    "successors": "i", "probabilities": "f", "rewards": "f", "first_line": "i", "start_numbers": "i", "start_values": "f",
+    "sampled": "i", "outside": "U", "resets": "i",
+}  # fmt: skip
+"""The arrays of a file and the kinds of their dtype."""
 
 
 class Explored:
@@ -168,24 +176,71 @@ def load_explored(path: Path, space: spaces.Space, n_actions: int, identity: dic
         RunConflict: a file of another environment or of other settings, or none that can be read.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:  # a broken file is closed too
-            found = {name: archive[name] for name in archive.files}
-        asked = dict(json.loads(str(found["identity"])))
-        explored = _rebuilt(found, space, n_actions)
-    except (*UNREADABLE, LookupError) as error:
+        found = read_arrays(path)
+        told = {name: json_in(found, name) for name in ("identity", "counted", "always")}
+        asked = told["identity"]
+        if not isinstance(asked, dict):
+            raise DamagedFile(f"it is of {asked!r:.80}")
+        if asked == json.loads(json.dumps(identity, sort_keys=True)):
+            _check(found, told, space, n_actions)
+            return _rebuilt(found, told, space, n_actions)
+    except (InvalidInput, OSError) as error:
         raise RunConflict(
             f"{path} holds no enumeration ({error}): expected one to continue. Remove it to begin anew."
         ) from error
-    if asked != json.loads(json.dumps(identity, sort_keys=True)):
-        different = sorted(name for name in {*asked, *identity} if asked.get(name) != identity.get(name))
-        raise RunConflict(
-            f"{path} holds the enumeration of something else (other: {', '.join(different)}): expected the same environment "
-            "and settings. Name another file, or remove it to begin anew."
-        )
-    return explored
+    different = sorted(name for name in {*asked, *identity} if asked.get(name) != identity.get(name))
+    raise RunConflict(
+        f"{path} holds the enumeration of something else (other: {', '.join(different)}): expected the same environment "
+        "and settings. Name another file, or remove it to begin anew."
+    )
 
 
-def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) -> Explored:
+def _check(found: dict[str, np.ndarray], told: dict[str, Any], space: spaces.Space, n_actions: int) -> None:
+    """Are these the arrays of a search, each of its size, each number within what it numbers?
+
+    Raises:
+        DamagedFile: naming the first array that is not.
+        UnknownObservation: a state that is no member of the space.
+    """
+    missing = [name for name in PARTS if name not in found]
+    if missing:
+        raise DamagedFile(f"it has no {missing[0]}: expected one beside {sorted(found)[:9]}.")
+    sizes = {name: found[name].shape[:1] for name in PARTS}
+    n, e, k = sizes["states"], sizes["ends"], (len(ranges(space)),)
+    shapes = {**sizes, "states": n + k, "ends": e + k, "parents": n, "actions": n, "script_lengths": n}
+    shapes |= dict.fromkeys(("successors", "probabilities", "rewards"), sizes["rows"])
+    shapes |= {"start_values": sizes["start_numbers"], "outside": (), "resets": ()}
+    for name, kinds in PARTS.items():
+        if found[name].dtype.kind not in kinds or found[name].shape != shapes[name]:
+            there = f"shape {found[name].shape} and dtype {found[name].dtype}"
+            raise DamagedFile(f"its {name} have {there}: expected shape {shapes[name]}.")
+    first, N = found["first_line"], len(found["states"])
+    pairs = (first.size - 1) * n_actions
+    spans: dict[str, tuple[float, Any]] = {
+        "parents": (-1, np.arange(N)), "actions": (-1, n_actions), "script_lengths": (0, found["scripts"].size + 1),
+        "scripts": (-1, 2**62), "rows": (0, pairs), "successors": (-len(found["ends"]), N), "probabilities": (0, 1 + 1e-9),
+        "rewards": (-LARGEST, LARGEST), "first_line": (0, found["rows"].size + 1), "start_numbers": (0, N),
+        "start_values": (0, 1 + 1e-9), "sampled": (0, pairs), "resets": (0, 2**62),
+    }  # fmt: skip
+    for name, (low, high) in spans.items():
+        wrong = ~((found[name] >= low) & (found[name] < high))
+        if wrong.any():
+            raise DamagedFile(f"its {name} hold {found[name][wrong][0]}: expected from {low} to below {np.max(high)}.")
+    counts, always, m = told["counted"], told["always"], found["rows"].size
+    fits = {
+        "first_line": 0 < first.size <= N + 1 and first[0] == 0 and first[-1] == m and (np.diff(first) >= 0).all(),
+        "scripts": N > 0 and found["script_lengths"].sum() == found["scripts"].size,
+        "counted": isinstance(counts, dict) and all(type(one) is int for one in counts.values()),
+        "always": isinstance(always, list) and all(type(one) is str for one in always),
+    }  # fmt: skip
+    for name, fine in fits.items():
+        if not fine:
+            raise DamagedFile(f"its {name} does not fit the rest: expected that of one search.")
+    for name in ("states", "ends"):
+        checked_members(space, found[name].astype(np.int64))
+
+
+def _rebuilt(found: dict[str, np.ndarray], told: dict[str, Any], space: spaces.Space, n_actions: int) -> Explored:
     explored = Explored(n_actions)
     keys = keys_of_numbers(space, found["states"])
     stops = np.cumsum(found["script_lengths"])
@@ -200,9 +255,11 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, n_actions: int) 
         setattr(explored, name, array("d", found[name].astype(float).tolist()))
     explored.first_line = array("q", found["first_line"].tolist())
     explored.starts = dict(zip(found["start_numbers"].tolist(), found["start_values"].tolist(), strict=True))
-    explored.counted |= dict(json.loads(str(found["counted"])))
-    explored.always = tuple(json.loads(str(found["always"])))
+    explored.counted |= told["counted"]
+    explored.always = tuple(told["always"])
     explored.sampled = set(found["sampled"].tolist())
     explored.outside, explored.resets = str(found["outside"]), int(found["resets"])
+    if len(explored.ids) < len(keys) or len(explored.ends) < len(found["ends"]):
+        raise DamagedFile("a state stands in it twice: expected each once.")
     explored.settle()
     return explored

@@ -11,6 +11,7 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations
+from irl_gym.hdf5_files import BROKEN, check_hdf5
 from irl_gym.imports.arrays import episodes_of
 from irl_gym.imports.cutting import from_lists
 from irl_gym.imports.files import closest
@@ -156,9 +157,10 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise DatasetMissing(f"{path} is not a file: expected an HDF5 file with D4RL's arrays.")
     try:
+        check_hdf5(path)
         with h5py.File(path, "r") as file:
             return _read_group(file, ("observations", "next_observations"))
-    except OSError as error:
+    except BROKEN as error:
         raise InvalidDemonstrations(f"{path} cannot be read ({error}): expected an HDF5 file with D4RL's arrays.") from error
 
 

@@ -1,0 +1,180 @@
+"""The files of a Minari dataset from anybody, looked through before Minari opens them.
+
+    data/metadata.json                           what it is of: its spaces, ids, counts
+    data/main_data.hdf5                          its episodes, or
+    data/N/part-0.arrow, data/N/metadata.json    a folder an episode
+
+Minari believes them: counts become arrays, links are followed, and where a space is missing it makes whatever environment the
+file names. Numbers in Arrow may point outside of their file; its own check is made first.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.archives import check_declared
+from irl_gym.errors import DamagedFile
+from irl_gym.hdf5_files import check_hdf5
+from irl_gym.told_spaces import told_space
+
+HDF5 = "main_data.hdf5"
+MOST_TOLD = 64 << 20
+"""Bytes of a metadata.json, which may list the bounds of large observations."""
+_TEXTS = ("dataset_id", "data_format", "minari_version")
+
+
+def check_told(folder: Path) -> None:
+    """Check what a dataset says of itself.
+
+    Args:
+        folder: `data` in the dataset's.
+
+    Raises:
+        OSError: a file that is not there, or cannot be opened.
+        DamagedFile: one that says what no dataset does, or leads out of the folder.
+    """
+    inside(folder, folder / "metadata.json")
+    told = read_told(folder / "metadata.json")
+    for name in _TEXTS:
+        if not isinstance(told.get(name), str):
+            raise DamagedFile(f"its metadata have the {name} {told.get(name)!r:.80}, which is no text")
+    for name in ("observation_space", "action_space"):
+        told_space(name, told.get(name))
+    for name in ("env_spec", "eval_env_spec"):
+        _check_spec(name, told.get(name))
+    for name in ("author", "author_email", "combined_datasets", "requirements"):
+        if not isinstance(told.get(name, []), list) or not all(isinstance(one, str) for one in told.get(name, [])):
+            raise DamagedFile(f"its metadata have the {name} {told[name]!r:.80}, which is no list of texts")
+    for name in ("total_episodes", "total_steps"):
+        if type(told.get(name)) is not int or not 0 <= told[name] <= 1 << 48:
+            raise DamagedFile(f"its metadata have the {name} {told.get(name)!r:.80}, which is no count")
+    if told["data_format"] not in ("hdf5", "arrow", "parquet"):
+        raise DamagedFile(f"its data_format is {told['data_format'][:80]!r}, and none of hdf5, arrow and parquet")
+    held = os.path.getsize(folder / HDF5) if told["data_format"] == "hdf5" else sum(1 for _ in os.scandir(folder))
+    if told["total_episodes"] > held:
+        raise DamagedFile(f"its metadata tell of {told['total_episodes']} episodes, for which it has no room")
+
+
+def check_episodes(folder: Path, data_format: str, numbers: Iterator[int]) -> None:
+    """Check the episodes of a dataset; as `check_told`.
+
+    Args:
+        folder: `data` in the dataset's.
+        data_format: hdf5, arrow or parquet.
+        numbers: of the episodes.
+    """
+    if data_format == "hdf5":
+        inside(folder, folder / HDF5)
+        check_hdf5(folder / HDF5)
+        return
+    for number in numbers:
+        inside(folder, folder / str(number), of_files=False)
+        for one in sorted((folder / str(number)).iterdir()):
+            inside(folder, one)
+            if one.name != "metadata.json" and not one.name.startswith(("_", ".")):
+                _check_table(one, data_format)
+
+
+def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.Space, actions: Any) -> None:
+    """Check that what Minari gives of an episode is of the dataset's own spaces; whether it fits together, the reader says.
+
+    Raises:
+        DamagedFile: naming the episode, and the first thing that is not.
+    """
+    here, taken = f"episode {episode.id}", np.asarray(episode.actions)
+    if taken.dtype.kind not in "iu" or taken.ndim != 1:
+        raise DamagedFile(f"{here} has actions of shape {taken.shape} and dtype {taken.dtype}, and no whole numbers (T,)")
+    wrong = np.flatnonzero((taken < int(actions.start)) | (taken > int(actions.start) + int(actions.n) - 1))
+    if wrong.size:
+        raise DamagedFile(f"{here}, step {wrong[0]} has action {taken[wrong[0]]}, which is not of {actions}")
+    rewards = np.asarray(episode.rewards)
+    if rewards.dtype.kind not in "biuf" or rewards.ndim != 1:
+        raise DamagedFile(f"{here} has rewards of shape {rewards.shape} and dtype {rewards.dtype}, and no numbers (T,)")
+    seed = metadata.get("seed")
+    if seed is not None and (type(seed) is not int or seed < 0):
+        raise DamagedFile(f"{here} has the seed {seed!r:.80}, and no whole number of at least 0")
+    _check_observed(here, episode.observations, observations)
+
+
+def _check_observed(here: str, found: Any, space: Any) -> None:
+    """Check observations part by part: of the space's shape, numbers where it has numbers, and none that is NaN."""
+    if isinstance(space, spaces.Dict | spaces.Tuple):
+        keys = list(space.spaces) if isinstance(space, spaces.Dict) else range(len(space.spaces))
+        if len(found) != len(keys):
+            raise DamagedFile(f"{here} has observations of {len(found)} parts: expected {len(keys)}, as {space} has")
+        for key in keys:
+            _check_observed(here, found[key], space.spaces[key])
+        return
+    array, text = np.asarray(found), isinstance(space, spaces.Text)
+    kinds = "UO" if text else "biuf" if np.dtype(space.dtype).kind == "f" else "biu"
+    if array.dtype.kind not in kinds or (not text and array.shape[1:] != (space.shape or ())) or not array.ndim:
+        raise DamagedFile(f"{here} has observations of shape {array.shape} and dtype {array.dtype}, which are not of {space}")
+    if array.dtype.kind == "f" and np.isnan(array).any():
+        raise DamagedFile(f"{here} has an observation that is NaN at step {np.argwhere(np.isnan(array))[0][0]}")
+
+
+def inside(folder: Path, path: Path, *, of_files: bool = True) -> None:
+    """Check that a file is a regular one, or a folder one of `of_files=False`, and in a folder, wherever links lead.
+
+    Raises:
+        DamagedFile: it leads out of it, or is something else.
+    """
+    if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+        raise DamagedFile(f"{path.name} leads out of the dataset's folder, where nothing is read")
+    if path.exists() and not (path.is_file() if of_files else path.is_dir()):
+        raise DamagedFile(f"{path.name} is no regular {'file' if of_files else 'folder'}")
+
+
+def read_told(path: Path) -> dict[str, Any]:
+    """A json object of a dataset.
+
+    Raises:
+        OSError: it cannot be opened.
+        DamagedFile: it is something else, or larger than any.
+    """
+    if path.stat().st_size > MOST_TOLD:
+        raise DamagedFile(f"{path.name} has {path.stat().st_size:,} bytes, more than {MOST_TOLD:,}")
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise DamagedFile(f"{path.name} is no json: {str(error)[:200]}") from error
+    if not isinstance(told, dict):
+        raise DamagedFile(f"{path.name} holds {told!r:.80}, and no object")
+    return told
+
+
+def _check_spec(name: str, told: Any) -> None:
+    """Check that a spec is a text of an object; what it names is not looked at here."""
+    if told is None:
+        return
+    try:
+        spec = json.loads(told) if isinstance(told, str) else None
+    except (ValueError, RecursionError) as error:
+        raise DamagedFile(f"its {name} is no json: {str(error)[:200]}") from error
+    if not isinstance(spec, dict) or not isinstance(spec.get("id"), str) or not isinstance(spec.get("kwargs", {}), dict):
+        raise DamagedFile(f"its {name} is {told!r:.80}, and no spec of an environment")
+
+
+def _check_table(path: Path, data_format: str) -> None:
+    """Check a file of Arrow's."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        if data_format == "parquet":
+            about = pq.read_metadata(path)
+            check_declared(sum(about.row_group(i).total_byte_size for i in range(about.num_row_groups)), path.stat().st_size)
+            check_declared(8 * about.num_rows * about.num_columns, path.stat().st_size)
+            return
+        with pa.memory_map(str(path)) as file, pa.ipc.open_file(file) as batches:
+            for i in range(batches.num_record_batches):
+                batches.get_batch(i).validate(full=True)
+    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, MemoryError) as error:
+        if isinstance(error, DamagedFile):
+            raise
+        raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error

@@ -17,6 +17,7 @@ from gymnasium import spaces
 from irl_gym.errors import InvalidMDP, InvalidParameter
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
+from irl_gym.own_files import write_arrays
 from irl_gym.repeats import Repeats
 from irl_gym.rewards import UNREADABLE, TabularReward, plain_json
 from irl_gym.selfcheck import Payments, SelfCheck
@@ -59,16 +60,14 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
     Raises:
         InvalidMDP: states of another numbering, such as the cells of a grid.
     """
-    states, mdp, path = table.states, table.mdp, Path(path)
+    states, mdp = table.states, table.mdp
     if not isinstance(states, StateIndex | ListedStates):
         raise InvalidMDP(
             f"the states are {type(states).__name__}: expected a StateIndex or ListedStates. Make such a table again instead."
         )
     evidence = asdict(table.evidence)
     none = np.zeros(0)
-    beside = path.with_name(f".{path.name}.tmp.npz")
-    np.savez(
-        beside,
+    arrays = dict(
         data=mdp.P.data, indices=mdp.P.indices, indptr=mdp.P.indptr, d0=mdp.d0, gamma=np.array(mdp.gamma),
         visits=none if mdp.visits is None else mdp.visits,
         reward=table.reward.values, mean=table.payments.mean, deviation=table.payments.deviation,
@@ -79,7 +78,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
         copies=np.array(list(states.terminal_copies.items()), dtype=np.int64).reshape(-1, 2),
         evidence=np.array(json.dumps(evidence, default=plain_json, sort_keys=True)),
     )  # fmt: skip
-    os.replace(beside, path)
+    write_arrays(path, arrays)
 
 
 def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:

@@ -15,6 +15,7 @@ from irl_gym.demonstrations import empirical_policy
 from irl_gym.diagnoses.case import Case
 from irl_gym.errors import IrlGymError
 from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.own_files import check_links
 from irl_gym.rewards import UNREADABLE, TabularReward
 from irl_gym.run_folder import RECORDS, read_json
 from irl_gym.table_files import TABLE, load_table
@@ -24,6 +25,7 @@ from irl_gym.tabulation import Tabulation
 def left_behind(path: Path) -> Case | None:
     """The case that a folder's files make; None where they are not enough, or cannot be read."""
     try:
+        check_links(path)
         config = read_json(path / "config.json")
         space = deserialize_space(read_json(path / "environment.json")["observations"])
         table = load_table(path / TABLE, space)

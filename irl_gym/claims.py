@@ -17,7 +17,7 @@ from minari.serialization import serialize_space
 
 from irl_gym.errors import RunConflict, RunNewer
 from irl_gym.names import action_names
-from irl_gym.run_folder import RunFolder, read_json, write_json
+from irl_gym.run_folder import RunFolder, is_empty, read_json, write_json
 from irl_gym.table_files import TABLE, UNDER_WAY
 
 NUMBER = 1
@@ -40,7 +40,7 @@ def claim(path: Path, config: dict[str, Any]) -> None:
         RunConflict: it holds another run, or files that are no run at all.
         RunNewer: it holds a run of a newer version.
     """
-    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+    if not path.exists() or is_empty(path):
         return
     if (path / VERSION).exists():
         try:

@@ -7,6 +7,7 @@ Axes: n points.
 """
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from irl_gym.intervals import mean_interval
+from irl_gym.own_files import write_bytes
 from irl_gym.sampling import Successors
 from irl_gym.tabulation import Tabulation
 
@@ -45,8 +47,9 @@ def write_curve(curve: Curve, path: Path) -> None:
     """Write a curve as csv; what is not known is left empty."""
     numbers = (curve.value, curve.mean, curve.low, curve.high)
     points = zip(curve.steps.tolist(), *(["" if np.isnan(x) else x for x in one.tolist()] for one in numbers), strict=True)
-    with path.open("w", newline="") as file:
-        csv.writer(file).writerows([COLUMNS, *((int(steps), *rest) for steps, *rest in points)])
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows([COLUMNS, *((int(steps), *rest) for steps, *rest in points)])
+    write_bytes(path, text.getvalue().encode())
 
 
 def read_curve(path: Path) -> Curve:

@@ -7,8 +7,6 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 import contextlib
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,6 +30,7 @@ from irl_gym.errors import (
 from irl_gym.hdf5_files import BROKEN
 from irl_gym.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.minari_formats import DataFormat
+from irl_gym.own_files import scratch
 from irl_gym.states import States
 
 _ROOT = "MINARI_DATASETS_PATH"
@@ -101,12 +100,9 @@ def write_minari(
     about = described(dataset_id, env, observation_space, action_space, data_format, metadata)
     with writable_root(root) as base:
         check_free(base, dataset_id)
-        beside = Path(tempfile.mkdtemp(prefix=".writing-", dir=base))
-        try:
+        with scratch(base) as beside:
             write_files(beside, about, episodes)
             publish(beside, base, dataset_id)
-        finally:
-            shutil.rmtree(beside, ignore_errors=True)
         return minari.load_dataset(dataset_id)
 
 

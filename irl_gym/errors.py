@@ -30,7 +30,8 @@ IrlGymError
 ├── DatasetExists              a Minari id that is taken
 ├── DatasetMissing (also a FileNotFoundError)  a Minari id that is not there
 ├── NotInstalled (also an ImportError)  an optional package that is asked for and missing
-├── RunConflict                a run folder that holds another run
+├── RunConflict                a run folder that holds another run, or that another process works in
+├── WriteFailed (also an OSError)  the disk became full, or the folder was deleted, while something was written
 └── UnreadableRun
     ├── RunIncomplete          a run that was killed before its end, or lost a file
     └── RunNewer               a run that a newer version wrote
@@ -160,7 +161,11 @@ class NotInstalled(IrlGymError, ImportError):
 
 
 class RunConflict(IrlGymError):
-    """A run folder that holds another run."""
+    """A run folder that holds another run, or in which another process works."""
+
+
+class WriteFailed(IrlGymError, OSError):
+    """The disk became full, or the folder was deleted, while something was written into it."""
 
 
 class UnreadableRun(IrlGymError):

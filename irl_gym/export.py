@@ -6,10 +6,11 @@ Beside the datasets of a root there is, while an export is under way, a hidden f
     shards/        the episodes drawn so far, in closed files
     expert.*       what the demonstrator keeps, such as an agent that it trained
     assembled/     the dataset, being written from the shards
-    ready          the dataset is whole
+    ready          the plan again, once the dataset is whole
 
 A demonstrator gives episode i the same whenever it is asked, so an export that was killed goes on after its last shard and ends
-in the dataset that it would have ended in. Shards are removed after the dataset has its id, the plan last.
+in the dataset that it would have ended in. When the dataset has its id, `ready` is moved beside the folder before anything is
+removed, and goes last, in one step: as long as there is a trace of an export, the same again finishes it.
 Axes: T steps, N episodes.
 """
 
@@ -30,15 +31,12 @@ from irl_gym.datasets import writable_root
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, RunConflict
 from irl_gym.minari_files import Description, check_free, publish, write_files
+from irl_gym.own_files import LOCK, held, write_bytes
 from irl_gym.rewards import plain_json
-from irl_gym.run_folder import write_json
+from irl_gym.run_folder import read_json, write_json
 from irl_gym.shards import SHARD_BYTES, Shards, size_of
 
-try:
-    import fcntl
-except ModuleNotFoundError:  # not on Windows; there two processes in one folder are not kept apart
-    fcntl = None
-
+PLAN = "plan.json"
 SHARD_SECONDS = 1.0
 """What a kill can cost of drawing."""
 
@@ -103,7 +101,9 @@ def export_dataset(
 
     Raises:
         DatasetExists: the id is taken; said before anything is drawn.
-        RunConflict: an export of another plan to this id was begun, or another process is at it.
+        RunConflict: an export of another plan to this id was begun, another process is at it, or a link in its folder
+            leads out of it.
+        WriteFailed: the disk became full, or the folder was deleted meanwhile.
         InvalidParameter: a root that cannot be written.
         InvalidDemonstrations: the demonstrator ended before the amount was reached; what it gave is kept.
     """
@@ -114,7 +114,7 @@ def export_dataset(
     }, default=plain_json))  # fmt: skip
     with writable_root(root) as base:
         folder = base / f".exporting-{hashlib.sha256(about.dataset_id.encode()).hexdigest()[:16]}"
-        if not folder.exists():
+        if not folder.exists() and not _cleared(folder).exists():
             check_free(base, about.dataset_id)
         with _alone(folder, about.dataset_id):
             finished = _published(folder, base, about.dataset_id)
@@ -125,47 +125,59 @@ def export_dataset(
                 _take(folder, about.dataset_id, wanted)
                 _make(folder, base, about, amount, begin, report)
                 _remove(folder)
+        _cleared(folder).unlink(missing_ok=True)
         return minari.load_dataset(about.dataset_id)
+
+
+def _cleared(folder: Path) -> Path:
+    """Where `ready` is while the folder of a finished export is removed, and until that is done."""
+    return folder.with_name(f"{folder.name}.ready")
 
 
 def _published(folder: Path, base: Path, dataset_id: str) -> dict[str, Any] | None:
     """The plan of an export that gave its dataset the id and was killed before it had cleared away; None if it was not."""
-    ready = folder / "ready"
-    if not ready.exists() or (folder / "assembled" / dataset_id).exists() or not (base / dataset_id).exists():
+    if not (base / dataset_id).exists() or (folder / "assembled" / dataset_id).exists():
         return None
-    return json.loads(ready.read_text())
+    told = next((one for one in (folder / "ready", _cleared(folder)) if one.exists()), None)
+    return None if told is None else _plan(told, folder)
 
 
 @contextlib.contextmanager
 def _alone(folder: Path, dataset_id: str) -> Iterator[None]:
-    """Hold the folder of an export; the system lets go when the process ends, however it does. It goes if nothing is in it."""
-    folder.mkdir(exist_ok=True)
-    with (folder / "lock").open("w") as file:
-        if fcntl is not None:
+    """Hold the folder of an export, as `held`; it goes if nothing is in it."""
+    try:
+        if folder.is_symlink() or _cleared(folder).is_symlink():
+            raise RunConflict(f"{folder} is a link: expected the folder of an export. Delete it.")
+        with held(folder, f"another process exports {dataset_id!r} into {folder.parent}: wait for it."):
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                raise RunConflict(f"another process exports {dataset_id!r} into {folder.parent}: wait for it.") from error
-        try:
-            yield
-        finally:
-            if folder.exists() and not _begun(folder):
-                _remove(folder)
+                yield
+            finally:
+                if folder.exists() and not _begun(folder):
+                    (folder / PLAN).unlink(missing_ok=True)
+    finally:
+        with contextlib.suppress(OSError):  # something is in it, or somebody
+            folder.rmdir()
 
 
 def _begun(folder: Path) -> bool:
     """Is there anything that would be lost with this folder?"""
-    return any(one.name not in ("lock", "plan.json") for one in folder.iterdir())
+    return any(one.name not in (LOCK, PLAN) for one in folder.iterdir())
+
+
+def _plan(path: Path, folder: Path) -> dict[str, Any]:
+    """The plan of the export in a folder, from one of the files that keep it."""
+    try:
+        return read_json(path)
+    except (OSError, ValueError) as error:
+        told = f"{path} cannot be read ({error}): expected the plan of an export."
+        raise RunConflict(f"{told} Delete {folder if path.is_relative_to(folder) else path}.") from error
 
 
 def _take(folder: Path, dataset_id: str, wanted: dict[str, Any]) -> None:
     """Write the plan, or check that it is the one that was begun."""
-    known = folder / "plan.json"
+    known = folder / PLAN
     if known.exists() and _begun(folder):
-        try:
-            found = dict(json.loads(known.read_text()))
-        except (ValueError, TypeError) as error:
-            raise RunConflict(f"{known} cannot be read ({error}): expected the plan of an export. Delete {folder}.") from error
+        found = _plan(known, folder)
         for key in sorted({*found, *wanted}):
             if found.get(key) != wanted.get(key):
                 raise RunConflict(
@@ -194,8 +206,7 @@ def _make(
                 report("writing", n / shards.n_episodes)
 
         write_files(assembled, about, shards, written)
-        shutil.copyfile(folder / "plan.json", folder / ".ready.tmp")
-        (folder / ".ready.tmp").replace(ready)
+        write_bytes(ready, (folder / PLAN).read_bytes())
         report("writing", 1.0)
     publish(assembled, base, about.dataset_id)
 
@@ -223,10 +234,11 @@ def _draw(shards: Shards, demonstrator: Demonstrator, amount: Amount, report: On
 
 
 def _remove(folder: Path) -> None:
-    """Clear away what is left of an export; `ready` last, which tells that it is finished."""
-    for path in sorted(folder.iterdir(), key=lambda one: one.name == "ready"):
-        if path.is_dir():
+    """Clear away what is left of an export whose dataset has its id, but for what tells that it is finished."""
+    if (folder / "ready").exists():
+        (folder / "ready").replace(_cleared(folder))
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
-        else:
+        elif path.name != LOCK:
             path.unlink()
-    folder.rmdir()

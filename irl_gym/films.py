@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from irl_gym.run_folder import read_json
+from irl_gym.run_folder import read_json, write_text
 
 FORMAT = "irl_gym.Film/1"
 KINDS = ("webp", "png")
@@ -71,7 +71,7 @@ class Film:
             (folder / self.name).mkdir()
         for number, picture in enumerate(self.frames):
             (folder / self.name / f"{number:03d}.{self.kind}").write_bytes(picture)
-        (folder / f"{self.name}.json").write_text(json.dumps(told, indent=1, sort_keys=True, allow_nan=False) + "\n")
+        write_text(folder / f"{self.name}.json", json.dumps(told, indent=1, sort_keys=True, allow_nan=False) + "\n")
 
 
 def load_film(path: Path) -> Film:

@@ -58,7 +58,7 @@ OnProgress = Callable[[str, float], None]
 
 
 class Loop:
-    """One run: the stages, in order, over a folder.
+    """One run: the stages, in order, over a folder. Whoever makes it holds the folder (`own_files.held`).
 
     Args:
         experiment: what to do.

@@ -10,10 +10,13 @@ config.json has them. The reward has rows of its own, as the policy "reward".
 """
 
 import csv
+import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+from irl_gym.own_files import write_bytes
 
 COLUMNS = ("env", "env_kwargs", "gamma", "seed", "learner", "retrain", "policy", "metric", "value")
 REWARD = "reward"
@@ -33,8 +36,9 @@ def write_metrics_csv(metrics: Mapping[str, Any], path: Path, *, env: str | None
     made, learner, retrain = (json.dumps(config[name], sort_keys=True) for name in ("env_kwargs", "learner", "retrain"))
     which = (env, made, config["gamma"], config["seed"], learner, retrain)
     rows = [(*which, part, name, value) for part, told in parts.items() for name, value in _numbers(told)]
-    with path.open("w", newline="") as file:
-        csv.writer(file).writerows([COLUMNS, *rows])
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows([COLUMNS, *rows])
+    write_bytes(path, text.getvalue().encode())
 
 
 def _numbers(told: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, float | None]]:

@@ -203,7 +203,6 @@ def publish(folder: Path, base: Path, dataset_id: str) -> None:
     final.parent.mkdir(parents=True, exist_ok=True)
     for parent in final.parents[: len(Path(dataset_id).parts) - 1]:  # each a namespace of Minari
         if not (parent / _NAMESPACE).exists():
-            beside = parent / f".{_NAMESPACE}.tmp"
-            beside.write_text("{}")
-            beside.replace(parent / _NAMESPACE)
+            (folder / _NAMESPACE).write_text("{}")
+            os.replace(folder / _NAMESPACE, parent / _NAMESPACE)
     os.replace(folder / dataset_id, final)

@@ -9,6 +9,7 @@ Axes: T steps, N episodes.
 """
 
 import contextlib
+import io
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -50,9 +51,13 @@ def _columns(episode: Episode, first_action: int) -> dict[str, Any]:
 @contextlib.contextmanager
 def _hdf5(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
     # 1.10's format: a third of the size of the oldest, which h5py takes by default, and every library since 2016 reads it.
-    with h5py.File(data / "main_data.hdf5", "w", track_order=True, libver=("v110", "v110")) as file:
+    with (
+        _Failing(data / "main_data.hdf5") as target,
+        h5py.File(target, "w", track_order=True, libver=("v110", "v110")) as file,
+    ):
 
         def add(number: int, episode: Episode) -> None:
+            target.check()
             group = file.create_group(f"episode_{number}")
             group.attrs["id"] = number
             if episode.seed is not None:
@@ -63,6 +68,52 @@ def _hdf5(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
             group.create_group("infos")
 
         yield add
+
+
+class _Failing(io.RawIOBase):
+    """A file for HDF5 to write into, which ends the process where a write fails: so the failure is kept, and raised later."""
+
+    def __init__(self, path: Path):
+        self._file, self._failure = path.open("w+b", buffering=0), None
+
+    def check(self) -> None:
+        """Raise what went wrong since, if anything did."""
+        if self._failure is not None:
+            raise self._failure
+
+    def close(self) -> None:
+        """Close the file; raise what went wrong."""
+        if not self.closed:
+            super().close()
+            self._file.close()
+            self.check()
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """As files have it, and so the next three."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """The place."""
+        return self._file.tell()
+
+    def readinto(self, buffer: Any) -> int | None:
+        """Read."""
+        return self._file.readinto(buffer)
+
+    def write(self, content: Any) -> int:
+        """Write, or keep why not."""
+        return self._kept(lambda: self._file.write(content), len(content))
+
+    def truncate(self, size: int | None = None) -> int:
+        """Make it shorter or longer, or keep why not."""
+        return self._kept(lambda: self._file.truncate(size), size or 0)
+
+    def _kept(self, do: Callable[[], int | None], otherwise: int) -> int:
+        try:
+            return do() or 0
+        except OSError as error:
+            self._failure = self._failure or error
+            return otherwise
 
 
 def _put(group: h5py.Group, name: str, values: Any) -> None:

@@ -11,6 +11,7 @@ import gymnasium as gym
 from irl_gym.claims import STAGES
 from irl_gym.experiment import Experiment
 from irl_gym.loop import Loop, OnProgress
+from irl_gym.own_files import held
 from irl_gym.reveal import Reveal
 
 
@@ -70,11 +71,13 @@ def recover_and_retrain(
         DatasetMissing, DatasetMismatch: no such dataset, or one of another environment.
         DegenerateExpert: no reward prefers the expert's actions.
         SolverTimeout, SolverFailed: a linear program without an answer.
-        RunConflict: the folder holds another run.
+        RunConflict: the folder holds another run, another process works in it, or a link in it leads out of it.
         RunNewer: the folder holds a run of a newer version.
+        WriteFailed: the disk became full, or the folder was deleted meanwhile.
     """
-    loop = Loop(experiment, out, on_progress, command)
-    stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
+    with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
+        loop = Loop(experiment, out, on_progress, command)
+        stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
     return Report(loop.folder.path, loop.folder_metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
 
 

@@ -6,6 +6,7 @@ policy with SB3's `predict`.
 
 import contextlib
 import copy
+import io
 import os
 import re
 import zipfile
@@ -29,6 +30,7 @@ from irl_gym.checks import checked_number
 from irl_gym.dynamic_programming import value_iteration
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP, check_discount
+from irl_gym.own_files import write_bytes
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.states import StateIndex, States
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -125,10 +127,9 @@ class Agent:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write SB3's zip. Beside first, then renamed."""
-        path = Path(path)
-        beside = path.with_name(f".{path.name}.tmp.zip")
-        self.model.save(beside)
-        beside.replace(path)
+        content = io.BytesIO()  # torch would raise errors of its own where the disk is full
+        self.model.save(content)
+        write_bytes(path, content.getvalue())
 
 
 def load_agent(path: str | os.PathLike, algorithm: Algorithm, states: States | None = None) -> Agent:

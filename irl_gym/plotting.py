@@ -26,6 +26,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TransitionTable
 from irl_gym.names import Names
+from irl_gym.own_files import whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,10 +249,8 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
     }
     if kind not in blank:
         raise InvalidParameter(f"the path {path} ends in {path.suffix!r}: expected .png, .svg or .pdf.")
-    beside = path.with_name(f".{path.name}.tmp")
-    with matplotlib.rc_context({"svg.hashsalt": "irl_gym"}):
-        figure.savefig(beside, format=kind, dpi=130, metadata=blank[kind])
-    beside.replace(path)
+    with matplotlib.rc_context({"svg.hashsalt": "irl_gym"}), whole(path) as file:
+        figure.savefig(file, format=kind, dpi=130, metadata=blank[kind])
 
 
 def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, table: TransitionTable, names: Names) -> None:

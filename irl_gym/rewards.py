@@ -9,7 +9,6 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -19,6 +18,7 @@ from irl_gym.archives import json_in, read_arrays
 from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import DamagedFile, InvalidReward
 from irl_gym.mdp import TransitionTable
+from irl_gym.own_files import write_arrays
 
 FORMAT = "irl_gym.TabularReward/1"
 SOLVED_WITHIN = 1e-6
@@ -142,11 +142,7 @@ class TabularReward:
 
 def write_archive(path: str | os.PathLike, header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
     """Write arrays and a json header as an npz without pickle. Beside first, then renamed."""
-    path = Path(path)
-    beside = path.with_name(f".{path.name}.tmp.npz")
-    named: dict[str, Any] = {**arrays, "header": np.array(json.dumps(header, sort_keys=True, default=plain_json))}
-    np.savez(beside, **named)
-    beside.replace(path)
+    write_arrays(path, {**arrays, "header": np.array(json.dumps(header, sort_keys=True, default=plain_json))})
 
 
 def read_archive(path: str | os.PathLike, formats: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

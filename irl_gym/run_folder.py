@@ -2,10 +2,9 @@
 
 Each stage writes into a hidden folder beside and its files are renamed into place; then a record says it is done. A run that
 was killed and is started again with the same configuration continues after the last stage recorded. Another configuration
-in the same folder is refused, never overwritten.
+in the same folder is refused, never overwritten. Whoever runs stages holds the folder meanwhile (`own_files.held`).
 """
 
-import contextlib
 import json
 import os
 import shutil
@@ -15,12 +14,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from irl_gym.errors import InvalidParameter, RunConflict
-
-try:
-    import fcntl
-except ModuleNotFoundError:  # not on Windows; there two processes in one folder are not kept apart
-    fcntl = None
+from irl_gym.errors import RunConflict
+from irl_gym.own_files import LOCK, scratch, write_bytes
 
 RECORDS = ".stages"
 """Where the records of finished stages are, in the folder of a run."""
@@ -31,22 +26,8 @@ them loses no result, and no stage is run again."""
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file, beside first and then renamed; where that fails nothing is left beside.
-
-    Raises:
-        InvalidParameter: there is a folder of the file's own name.
-        OSError: the system refused.
-    """
-    if path.is_dir():
-        raise InvalidParameter(f"{path} is a folder: expected a file, or nothing yet. Move it away, or write elsewhere.")
-    beside = path.with_name(f".{path.name}.tmp")
-    try:
-        beside.write_text(text, encoding="utf-8", newline="\n")
-        beside.replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        raise
+    """Write a file in UTF-8, as `own_files.whole`."""
+    write_bytes(path, text.encode())
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -87,15 +68,10 @@ class RunFolder:
         if known.exists():
             self._compare(known, wanted)
             return
-        if self.path.exists() and (not self.path.is_dir() or any(not _beside(one) for one in self.path.iterdir())):
+        if self.path.exists() and not is_empty(self.path):
             raise RunConflict(f"{self.path} exists and holds no run: expected a new or empty folder. Choose another --out.")
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            write_json(known, wanted)
-        except OSError as error:
-            raise RunConflict(
-                f"{self.path} cannot be written ({error}): expected a folder of yours. Choose another --out."
-            ) from error
+        self.path.mkdir(parents=True, exist_ok=True)
+        write_json(known, wanted)
 
     def _compare(self, known: Path, wanted: dict[str, Any]) -> None:
         try:
@@ -108,8 +84,7 @@ class RunFolder:
         now = dict(_leaves(wanted))
         changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
         if before and changed and not any((self.path / RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
-            with self._alone():
-                write_json(known, wanted)
+            write_json(known, wanted)
             return
         if changed:
             key = changed[0]
@@ -157,40 +132,16 @@ class RunFolder:
 
         Returns:
             The record, with `seconds` and `files`; and `kept`, true, if the stage was finished in an earlier run.
-
-        Raises:
-            RunConflict: another process works in the folder.
         """
         finished = self._read(stage)
         if finished is not None:
             return {**finished, "kept": True}
-        with self._alone():
-            return self._make(stage, make)
-
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Hold the folder, so that no other process writes into it; the system lets go when the process ends, however it does.
-
-        Raises:
-            RunConflict: another process holds it.
-        """
-        with (self.path / ".lock").open("w") as file:
-            if fcntl is not None:
-                try:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except OSError as error:
-                    raise RunConflict(f"another process works in {self.path}: wait for it, or choose another --out.") from error
-            yield
-
-    def _make(self, stage: str, make: Callable[[Path], Mapping[str, Any]]) -> dict[str, Any]:
-        beside = self.path / f".{stage}.tmp"
-        shutil.rmtree(beside, ignore_errors=True)
-        beside.mkdir()
-        start = time.perf_counter()
-        record = {**make(beside), "seconds": time.perf_counter() - start}
-        made = [one.relative_to(beside) for one in beside.rglob("*") if one.is_file()]
-        record["files"] = sorted(one.as_posix() for one in made if one.parts[0] != LOGS)
-        _move(beside, self.path)
+        with scratch(self.path) as beside:
+            start = time.perf_counter()
+            record = {**make(beside), "seconds": time.perf_counter() - start}
+            made = [one.relative_to(beside) for one in beside.rglob("*") if one.is_file()]
+            record["files"] = sorted(one.as_posix() for one in made if one.parts[0] != LOGS)
+            _move(beside, self.path)
         self._record(stage).parent.mkdir(exist_ok=True)
         write_json(self._record(stage), record)
         return record
@@ -200,13 +151,14 @@ def _move(beside: Path, final: Path) -> None:
     """Move what is in a folder into another, in place of what has the same name there; the folder of logs is added to."""
     for made in sorted(beside.iterdir()):
         there = final / made.name
-        if made.name == LOGS and there.is_dir():
+        if made.name == LOGS and there.is_dir() and not there.is_symlink():
             _move(made, there)
             continue
-        if there.is_dir():
+        if there.is_dir() and not there.is_symlink():
             shutil.rmtree(there)
+        elif made.is_dir():
+            there.unlink(missing_ok=True)
         made.replace(there)
-    beside.rmdir()
 
 
 def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -218,6 +170,6 @@ def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield from _leaves(value, f"{prefix}.{key}" if prefix else key)
 
 
-def _beside(path: Path) -> bool:
-    """Is this what a write that was cut off left?"""
-    return path.name.startswith(".") and ".tmp" in path.name
+def is_empty(path: Path) -> bool:
+    """Is this a folder with nothing in it but what holds it, or what a write left that was cut off?"""
+    return path.is_dir() and all(one == LOCK or (one.startswith(".") and ".tmp" in one) for one in os.listdir(path))

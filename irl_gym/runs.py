@@ -21,6 +21,7 @@ from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.names import state_name
+from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
@@ -112,12 +113,13 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
 
     Raises:
         RunIncomplete: no run, one that was killed before its end, or a file of it is gone or damaged.
-        RunConflict: no run of this library.
+        RunConflict: no run of this library, or one with a link that leads out of its folder.
         RunNewer: a newer version wrote it.
     """
     path = Path(path)
     if not (path / "config.json").is_file():
         raise RunIncomplete(f"{path} holds no run: expected a folder with a config.json. Name the --out of a run.")
+    check_links(path)
     reader = _Reader(path)
     older = not (path / "run.json").exists()
     version: dict[str, Any] = {} if older else reader.read("run.json", read_json)

@@ -16,11 +16,11 @@ from gymnasium import spaces
 from irl_gym.archives import read_arrays
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DamagedFile, InvalidDemonstrations, InvalidParameter
+from irl_gym.own_files import write_arrays
 
 SHARD_BYTES = 4 << 20
 """Of episodes, about: as many are held in memory at a time."""
 NO_SEED = -1
-_BESIDE = ".tmp.npz"
 
 
 class Shards:
@@ -42,10 +42,7 @@ class Shards:
             self._n_shards += 1
             self.n_episodes, self.n_steps = self.n_episodes + lengths.size, self.n_steps + int(lengths.sum())
         for path in set(folder.glob("*.npz")) - set(map(self._path, range(self._n_shards))):
-            if path.name == _BESIDE:
-                path.unlink()
-            else:
-                path.replace(path.with_name(f"{path.name}.damaged"))
+            path.replace(path.with_name(f"{path.name}.damaged"))
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:06}.npz"
@@ -77,9 +74,7 @@ class Shards:
         if objects:  # np.savez would pickle them, and nothing is unpickled
             raise InvalidDemonstrations(f"{objects[0]} are Python objects: expected numbers or text, as of {self.space}.")
         self.folder.mkdir(exist_ok=True)
-        beside = self.folder / _BESIDE
-        np.savez(beside, **columns)
-        beside.replace(self._path(self._n_shards))
+        write_arrays(self._path(self._n_shards), columns)
         self._n_shards += 1
         self.n_episodes, self.n_steps = self.n_episodes + len(episodes), self.n_steps + int(columns["lengths"].sum())
 

@@ -19,6 +19,7 @@ from irl_gym.coordinates import CircularCoordinates, Coordinates, IntegerCoordin
 from irl_gym.errors import DamagedFile, InvalidInput, InvalidMDP, InvalidParameter, NotDiscrete
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP
+from irl_gym.own_files import write_arrays
 from irl_gym.repeats import Repeats
 from irl_gym.rewards import TabularReward, plain_json
 from irl_gym.selfcheck import Payments, SelfCheck
@@ -66,7 +67,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
     Raises:
         InvalidMDP: states of another numbering, or cells of coordinates of another class than those here.
     """
-    states, mdp, path = table.states, table.mdp, Path(path)
+    states, mdp = table.states, table.mdp
     if not _kept(states):
         raise InvalidMDP(
             f"the states are {type(states).__name__}: expected a StateIndex, ListedStates, or Cells of coordinates that no "
@@ -74,9 +75,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
         )
     evidence = asdict(table.evidence)
     none = np.zeros(0)
-    beside = path.with_name(f".{path.name}.tmp.npz")
-    np.savez(
-        beside,
+    arrays = dict(
         data=mdp.P.data, indices=mdp.P.indices, indptr=mdp.P.indptr, d0=mdp.d0, gamma=np.array(mdp.gamma),
         visits=none if mdp.visits is None else mdp.visits,
         reward=table.reward.values, mean=table.payments.mean, deviation=table.payments.deviation,
@@ -88,7 +87,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
         **(_of_cells(states) if isinstance(states, Cells) else {}),
         evidence=np.array(json.dumps(evidence, default=plain_json, sort_keys=True)),
     )  # fmt: skip
-    os.replace(beside, path)
+    write_arrays(path, arrays)
 
 
 def load_table(path: str | os.PathLike, space: spaces.Space) -> Tabulation:

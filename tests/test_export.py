@@ -171,7 +171,8 @@ def test_a_kill_before_any_file_operation_loses_nothing(tmp_path):
         if there:
             assert content(root) == expected
         if killed:
-            with contextlib.suppress(DatasetExists):  # after the last trace of the export but its empty folder is gone
+            after = contextlib.nullcontext() if any(root.glob(".*")) or not there else pytest.raises(DatasetExists)
+            with after:  # as long as there is a trace of the export, it ends well
                 run(root, amount=Amount(episodes=2))
         assert content(root) == expected, number
         assert sorted(one.name for one in root.iterdir()) == ["lake"], number

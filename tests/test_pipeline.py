@@ -58,7 +58,7 @@ def test_a_run_leaves(report, name):
 
 
 def test_a_run_leaves_nothing_half_written(report):
-    assert not [path for path in report.out.rglob("*") if ".tmp" in path.name or path.name.startswith(".writing")]
+    assert not [path for path in report.out.rglob("*") if ".tmp" in path.name or path.name == ".lock"]
 
 
 def test_a_run_leaves_a_dataset_that_plain_minari_opens(report):

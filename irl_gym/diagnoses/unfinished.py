@@ -14,6 +14,7 @@ from irl_gym.demonstrations import empirical_policy
 from irl_gym.diagnoses.case import Case
 from irl_gym.errors import IrlGymError
 from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
@@ -26,6 +27,7 @@ from irl_gym.told_spaces import told_space
 def left_behind(path: Path) -> Case | None:
     """The case that a folder's files make; None where they are not enough, or cannot be read."""
     try:
+        check_links(path)
         config = read_json(path / "config.json")
         space = told_space("observations", read_json(path / "environment.json")["observations"])
         table = load_table(path / TABLE, space)

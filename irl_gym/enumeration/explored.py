@@ -8,7 +8,6 @@ Axes: n states, e ends, m lines; a line is a successor of a pair (state, action)
 """
 
 import json
-import os
 from array import array
 from collections.abc import Hashable
 from pathlib import Path
@@ -21,6 +20,7 @@ from irl_gym.archives import json_in, read_arrays
 from irl_gym.checks import LARGEST
 from irl_gym.errors import DamagedFile, EnumerationLimit, InvalidInput, RunConflict
 from irl_gym.integer_spaces import checked_members, keys_of_numbers, numbers_of_keys, ranges
+from irl_gym.own_files import write_arrays
 
 Script = tuple[int, ...]
 """Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
@@ -141,9 +141,7 @@ class Explored:
         k = len(numbers_of_keys(space, self.keys[:1])[0])
         ends = numbers_of_keys(space, list(self.ends)[:e]) if e else np.zeros((0, k), dtype=np.int64)
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".{path.name}.tmp.npz")
-        np.savez(
-            beside,
+        arrays = dict(
             identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(counted)),
             sampled=np.array(sorted(row for row in self.sampled if row < expanded * self.n_actions), dtype=np.int64),
             always=np.array(json.dumps(self.always)), outside=np.array(self.outside), resets=np.array(self.resets),
@@ -156,7 +154,7 @@ class Explored:
             first_line=np.array(self.first_line[: expanded + 1]),
             start_numbers=np.array(list(self.starts), dtype=np.int64), start_values=np.array(list(self.starts.values())),
         )  # fmt: skip
-        os.replace(beside, path)
+        write_arrays(path, arrays)
 
 
 def too_large(explored: Explored, seconds: float, size: float, expected: str) -> EnumerationLimit:

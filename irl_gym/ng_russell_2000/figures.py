@@ -13,6 +13,7 @@ from irl_gym.layouts import grid_layout
 from irl_gym.ng_russell_2000.experiment_1 import Outcome1
 from irl_gym.ng_russell_2000.experiment_2 import PARKING, PLATEAU, Fits, Outcome2
 from irl_gym.ng_russell_2000.experiment_3 import Outcome3
+from irl_gym.own_files import whole
 from irl_gym.plotting import save_figure
 
 Outcome = Outcome1 | Outcome2 | Outcome3
@@ -36,10 +37,10 @@ def draw(outcome: Outcome, folder: Path) -> list[str]:
 
 def _shrink(path: Path) -> None:
     """Write a picture with a palette of 128 colours, which is a third of its size; beside, then renamed."""
-    beside = path.with_name(f".{path.name}.tmp.png")
     with Image.open(path) as picture:
-        picture.convert("RGB").quantize(128).save(beside, optimize=True)
-    beside.replace(path)
+        smaller = picture.convert("RGB").quantize(128)
+    with whole(path) as file:
+        smaller.save(file, "png", optimize=True)
 
 
 def figure_1(outcome: Outcome1) -> Figure:

@@ -54,4 +54,4 @@ def test_a_folder_of_the_page_s_own_name_gets_one_clear_line_and_leaves_nothing(
     (copied / "run" / "report.html").mkdir()
     made = script("report", "--run", "run", cwd=copied)
     assert made.returncode == 2 and "report.html is a folder: expected a file" in made.stderr and made.stderr.count("\n") == 1
-    assert not (copied / "run" / ".report.html.tmp").exists()
+    assert not list((copied / "run").glob(".*.tmp"))

@@ -20,6 +20,7 @@ from irl_gym.choices import (
     steps_only,
 )
 from irl_gym.counting import Interaction
+from irl_gym.endings import AfterEnd
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter
 from irl_gym.experiment import Experiment, parse_keywords
@@ -89,6 +90,8 @@ class Demonstrations:
     """Learn from this Minari dataset, in place of an expert."""
     dataset_root: Annotated[str | None, UNSET] = None
     """Minari's root folder; the default is Minari's own."""
+    after_end: AfterEnd = "refuse"
+    """Of an episode of the dataset that goes on after its end: refuse it, or cut it there."""
 
     @property
     def file(self) -> str | None:
@@ -222,7 +225,7 @@ class Arguments:
         return Experiment(
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
             bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
-            expert=planner(cast("PlannerName | None", shown.expert)) if file is None else FromFile.at(file),
+            shown.after_end, expert=planner(cast("PlannerName | None", shown.expert)) if file is None else FromFile.at(file),
             epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, inner=planner(self.learning.inner),
             shaping=self.retraining.shaping, retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
         )  # fmt: skip

@@ -32,6 +32,7 @@ from irl_gym.curves import write_curve
 from irl_gym.datasets import read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
+from irl_gym.endings import in_table
 from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
@@ -162,7 +163,10 @@ class Loop:
         """The expert's episodes."""
         asked = self.experiment
         if asked.dataset is not None:
-            return list(read_minari(asked.dataset, env=self.env, root=asked.dataset_root))
+            given = read_minari(asked.dataset, env=self.env, root=asked.dataset_root, after_end=asked.after_end)
+            if isinstance(self.world, TableWorld) and self.world.table.evidence.exact:
+                given = in_table(given, self.world.table.mdp, self.world.table.states, asked.after_end)
+            return list(given)
         return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.folder.path / "dataset"))
 
     @cached_property

@@ -20,6 +20,7 @@ from irl_gym.choices import (
     steps_only,
 )
 from irl_gym.counting import Interaction
+from irl_gym.endings import AfterEnd
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter
 from irl_gym.experiment import Experiment, parse_keywords
@@ -91,6 +92,8 @@ class Demonstrations:
     """Minari's root folder; the default is Minari's own."""
     trust_dataset: bool = False
     """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
+    after_end: AfterEnd = "refuse"
+    """Of an episode of the dataset that goes on after its end: refuse it, or cut it there."""
 
     @property
     def file(self) -> str | None:
@@ -230,7 +233,7 @@ class Arguments:
         return Experiment(
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
             bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
-            shown.trust_dataset,
+            shown.trust_dataset, shown.after_end,
             expert=planner(cast("PlannerName | None", shown.expert)) if file is None else FromFile.at(file),
             epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, inner=planner(self.learning.inner),
             shaping=self.retraining.shaping, retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,

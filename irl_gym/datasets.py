@@ -13,13 +13,13 @@ from typing import Any
 
 import gymnasium as gym
 import minari
-import numpy as np
 from gymnasium import spaces
 from minari.dataset.minari_storage import MinariStorage
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.dataset_files import check_episode, check_episodes, check_told
 from irl_gym.demonstrations import Episode
+from irl_gym.endings import AfterEnd, checked_after_end, episode_of
 from irl_gym.errors import (
     DatasetMismatch,
     DatasetMissing,
@@ -200,6 +200,7 @@ def read_minari(
     states: States | None = None,
     env: gym.Env | None = None,
     root: str | os.PathLike | None = None,
+    after_end: AfterEnd = "refuse",
 ) -> Iterator[Episode]:
     """Read the episodes of a Minari dataset with discrete actions, one at a time.
 
@@ -209,13 +210,18 @@ def read_minari(
         env: refuse a dataset recorded in another environment, by id and arguments. Where the dataset does not say where it was
             recorded, or in one that is not registered here, its spaces are compared.
         root: Minari's root folder; None for the one in force.
+        after_end: what to do with an episode that goes on after a step that is terminated or truncated, or has not as many
+            flags, rewards or observations as steps: "refuse" it, or "cut" it there; see `irl_gym.endings`.
 
     Raises:
         FileNotFoundError: no dataset of that id.
         NotDiscrete: continuous actions.
         DatasetMismatch: recorded in another environment, or one with other observations.
-        InvalidDemonstrations: no episode, one without steps, a reward that is not finite, or a file that cannot be read.
+        InvalidDemonstrations: no episode, one without steps or that goes on after its end, a reward that is not finite, or a
+            file that cannot be read.
+        InvalidParameter: another word for `after_end`.
     """
+    checked_after_end(after_end)
     if isinstance(dataset, str):
         dataset = load_minari(dataset, root=root)
     actions: Any = dataset.spec.action_space
@@ -235,19 +241,7 @@ def read_minari(
     first = int(actions.start)
     for episode, metadata in _stored(dataset):
         here = f"dataset {dataset.spec.dataset_id!r}, episode {episode.id}"
-        rewards = np.asarray(episode.rewards, float)
-        if not len(episode.actions) or not len(episode.terminations):
-            raise InvalidDemonstrations(f"{here} has no steps: expected at least one. Leave it out.")
-        wrong = np.flatnonzero(~np.isfinite(rewards))
-        if wrong.size:
-            raise InvalidDemonstrations(
-                f"{here}, step {wrong[0]} has reward {rewards[wrong[0]]}: expected a finite number. Write the dataset without "
-                "that episode, or with 0.0 where rewards are not known."
-            )
-        yield Episode(
-            episode.observations, np.asarray(episode.actions, dtype=np.int64) - first, rewards,
-            bool(episode.terminations[-1]), bool(episode.truncations[-1]), metadata.get("seed"),
-        )  # fmt: skip
+        yield episode_of(here, episode, metadata, first, after_end)
 
 
 def _stored(dataset: minari.MinariDataset) -> Iterator[tuple[Any, Any]]:

@@ -1,12 +1,13 @@
 """Demonstrations: episodes of a policy, and what they say about it.
 
-An episode of T steps has T + 1 observations, T actions, T rewards, and ends by `terminated` or `truncated`.
+An episode of T steps has T + 1 observations, T actions, T rewards, and ends by `terminated` or `truncated`. Where nobody wrote
+down what the last action led to, `ending` says so: the pair counts for the policy, and nothing is made of its successor.
 Axes: S states, A actions, K features, T steps, N episodes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -14,11 +15,13 @@ import numpy as np
 from irl_gym._typing import Matrix, StateMask
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidDemonstrations, UnknownObservation
-from irl_gym.features import batch_size, by_part
+from irl_gym.features import batch_sizes, by_part, take
 from irl_gym.mdp import TransitionTable
 from irl_gym.policies import Policy, as_distribution
 from irl_gym.sampling import Successors
 from irl_gym.states import States
+
+Ending = Literal["seen", "unseen", "followed", "dropped"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +29,7 @@ class Episode:
     """One episode.
 
     Raises:
-        InvalidDemonstrations: lengths that do not fit together, or no step at all.
+        InvalidDemonstrations: lengths that do not fit together, no step at all, or flags that are not one boolean each.
     """
 
     observations: Any
@@ -41,6 +44,10 @@ class Episode:
     """Did a time limit?"""
     seed: int | None = None
     """Given to `reset`; None when the episode was drawn from a table."""
+    ending: Ending = "seen"
+    """seen: the last observation is what the last action led to. unseen: that was not recorded, and the observation before
+    stands in its place. followed: nor was it, but an exact table has one successor only, which stands there. dropped: one more
+    action, taken in the last observation, was recorded and is left out."""
 
     def __post_init__(self) -> None:
         actions = np.asarray(self.actions)
@@ -55,11 +62,20 @@ class Episode:
                 f"an episode has {steps} actions and {len(self.rewards)} rewards: expected as many rewards as actions, and "
                 "at least one."
             )
-        count = batch_size(self.observations)
-        if count != steps + 1:
-            raise InvalidDemonstrations(
-                f"an episode of {steps} actions has {count} observations: expected {steps + 1}, the last one included."
-            )
+        for count in batch_sizes(self.observations):
+            if count != steps + 1:
+                raise InvalidDemonstrations(
+                    f"an episode of {steps} actions has {count} observations: expected {steps + 1}, the last one included."
+                )
+        for name in ("terminated", "truncated"):
+            flag = getattr(self, name)
+            if not isinstance(flag, bool | np.bool_):
+                raise InvalidDemonstrations(
+                    f"{name} is {flag!r}: expected True or False, of the last step. Cut the episode where it ended."
+                )
+            object.__setattr__(self, name, bool(flag))
+        if self.ending not in get_args(Ending):
+            raise InvalidDemonstrations(f"ending is {self.ending!r}: expected one of {', '.join(get_args(Ending))}.")
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -70,14 +86,34 @@ class Episode:
         return float(np.sum(self.rewards))
 
     def rows(self, states: States) -> np.ndarray:
-        """(T+1,) the states visited.
+        """(T+1,) the states visited; the last but one again where the last was not seen.
 
         Raises:
             UnknownObservation: an observation that the index does not hold.
         """
         ended = np.zeros(len(self) + 1, dtype=bool)
-        ended[-1] = self.terminated
+        ended[-1] = self.terminated and self.ending != "unseen"
         return states.encode_batch(self.observations, terminated=ended)
+
+    def seen_part(self) -> "Episode | None":
+        """The steps whose successors are known, which may be all; None where there is none.
+
+        What the last action led to is needed for transitions and for sums along states, not for a policy.
+        """
+        if self.ending != "unseen":
+            return self
+        if len(self) == 1:
+            return None
+        known = take(self.observations, slice(None, -1))
+        return replace(
+            self, observations=known, actions=self.actions[:-1], rewards=self.rewards[:-1], terminated=False, truncated=True,
+            ending="dropped",
+        )  # fmt: skip
+
+
+def seen_parts(episodes: Iterable[Episode]) -> list[Episode]:
+    """The parts of episodes whose every successor is known; those of which nothing is left are left out."""
+    return [part for one in episodes if (part := one.seen_part()) is not None]
 
 
 def stacked(observations: Sequence[Any]) -> Any:

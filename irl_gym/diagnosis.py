@@ -54,6 +54,8 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     sampled.cut_short,
     sampled.noisy_rows,
     unseen.strays,
+    unseen.dropped_actions,
+    unseen.unseen_ends,
     unseen.unvisited,
     values.small_gamma,
     values.gamma_near_one,

@@ -15,6 +15,7 @@ from irl_gym.demonstrations import Episode
 from irl_gym.discounted import EPSILON
 from irl_gym.distances import epic, starc
 from irl_gym.dynamic_programming import optimum
+from irl_gym.endings import LOST
 from irl_gym.errors import NotTabular, UndefinedDistance
 from irl_gym.estimated import evidence_told
 from irl_gym.howard import Optimum
@@ -146,7 +147,8 @@ def from_data(loop: "Loop") -> bool:
 
 def _recorded(loop: "Loop") -> dict[str, Any]:
     record = loop.stage("demonstrations")
-    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **_known_by(loop)}
+    lost = {key: record[key] for key in LOST if key in record}
+    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **_known_by(loop), **lost}
 
 
 def _known_by(loop: "Loop") -> dict[str, bool]:

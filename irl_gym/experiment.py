@@ -11,6 +11,7 @@ import numpy as np
 
 from irl_gym.checks import checked_number
 from irl_gym.choices import KNOWN, Reveals
+from irl_gym.endings import AfterEnd, checked_after_end
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Learner
 from irl_gym.learners.finite import FiniteLP
@@ -53,6 +54,8 @@ class Experiment:
     """Minari's root folder; None for the one in force."""
     trust_dataset: bool = False
     """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
+    after_end: AfterEnd = "refuse"
+    """What to do with an episode of the dataset that goes on after its end: "refuse" it, or "cut" it there."""
     expert: Planner | None = None
     """Plans or learns under the true reward; None for ValueIteration where there is a table, else SB3."""
     epsilon: float = 0.0
@@ -86,6 +89,7 @@ class Experiment:
                 "expected neither. Name env_id, or leave them out."
             )
         checked_epsilon(self.epsilon)
+        checked_after_end(self.after_end)
         if self.dataset is not None and (self.expert is not None or self.epsilon):
             raise InvalidParameter(
                 f"dataset is {self.dataset!r}, but expert is {self.expert} and epsilon {self.epsilon}: expected the episodes "
@@ -118,11 +122,16 @@ class Experiment:
         return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id or self.dataset or '')}-{digest}"
 
     def to_json(self) -> dict[str, Any]:
-        """The configuration as json; planners, learners and features with their class's name, large arrays by their digest."""
-        left_out = () if self.trust_dataset else ("trust_dataset",)  # runs of earlier versions have no such entry
-        return {name: _described(getattr(self, name)) for name in self.__dataclass_fields__ if name not in left_out}
+        """The configuration as json; planners, learners and features with their class's name, large arrays by their digest.
+
+        Fields that came later are left out at their default: so a run of an earlier version is known again.
+        """
+        told = {name: _described(getattr(self, name)) for name in self.__dataclass_fields__}
+        return {name: value for name, value in told.items() if name not in LATER or value != LATER[name]}
 
 
+LATER = {"after_end": "refuse", "trust_dataset": False}
+"""Fields that earlier versions had not, and what these did."""
 MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""
 

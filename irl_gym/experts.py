@@ -146,10 +146,7 @@ class SoftAgent:
 
     def _preferences(self, observation: Any) -> tuple[np.ndarray, bool]:
         model: Any = self.agent.model
-        states = self.agent.states
-        if states is not None:  # it was trained on rows
-            batch = states.is_batch(observation)
-            observation = states.encode_batch(observation) if batch else states.encode(observation)
+        observation = self.agent.shown(observation)
         model.policy.set_training_mode(False)
         tensor, batched = model.policy.obs_to_tensor(observation)
         with torch.no_grad():

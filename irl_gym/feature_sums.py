@@ -2,7 +2,7 @@
 
     V^_i(s_0) = mean over episodes of sum_t gamma^t phi_i(s_t), starting with phi_i(s_0)
 The value of the policy that made the episodes, under R = alpha . phi, is then alpha . V^. The state in which an episode
-ended counts once. Axes: N episodes, K features.
+ended counts once, and not where it was not recorded (`Episode.ending`). Axes: N episodes, K features.
 """
 
 from collections.abc import Iterable
@@ -41,6 +41,7 @@ def discounted_sums(
     sums = []
     for episode in episodes:
         visited = checked_features(phi, episode.observations if states is None else episode.rows(states))
+        visited = visited[:-1] if episode.ending == "unseen" else visited
         kept = visited if horizon is None else visited[: horizon + 1]
         sums.append(gamma ** np.arange(len(kept)) @ kept)
     if not sums:

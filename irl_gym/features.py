@@ -234,6 +234,13 @@ def batch_size(observations: Any) -> int:
     return len(observations)
 
 
+def batch_sizes(observations: Any) -> list[int]:
+    """The same, of each part of the batch."""
+    sizes: list[int] = []
+    by_part(lambda part: sizes.append(len(part)), observations)
+    return sizes
+
+
 def by_part(function: Callable[..., Any], *batches: Any) -> Any:
     """Call a function on the arrays of batches that are laid out alike, part by part."""
     first = batches[0]

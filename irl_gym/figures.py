@@ -9,6 +9,7 @@ import numpy as np
 from irl_gym import plotting
 from irl_gym.cell_maps import draw_actions, draw_planes
 from irl_gym.cells import Cells
+from irl_gym.demonstrations import seen_parts
 from irl_gym.dynamic_programming import evaluate_policy
 from irl_gym.evaluation import learning_curve
 from irl_gym.layouts import GridLayout, grid_layout
@@ -102,7 +103,7 @@ def _of_steps(loop: "Loop", world: SteppedWorld) -> dict[str, plotting.Figure]:
         return {}
     seed = loop.experiment.seed + 31_337
     episodes = {
-        "expert": loop.demonstrations[:RETURNS],
+        "expert": seen_parts(loop.demonstrations)[:RETURNS],
         "random": world.episodes(world.random, RETURNS, seed),
         "retrained": world.episodes(loop.agent, RETURNS, seed + RETURNS),
     }

@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from PIL import Image, features
 
-from irl_gym.demonstrations import Episode
+from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.errors import UnknownObservation
 from irl_gym.features import batch_of_one, take
 from irl_gym.films import MOST_BYTES, Film, Moment
@@ -67,7 +67,7 @@ def film(loop: "Loop", name: str) -> Film:
     env, without = _stage(loop.env)
     try:
         if given:
-            episode = loop.demonstrations[0]
+            episode = (seen_parts(loop.demonstrations) or loop.demonstrations)[0]
             made, seed = _replayed(env, episode, without), episode.seed
         else:
             choose = _chooser(loop, loop.expert if name == "expert" else loop.agent, seed)

@@ -15,6 +15,7 @@ from irl_gym.errors import DatasetMismatch, InvalidParameter, NotTabular
 from irl_gym.experts import load_expert
 from irl_gym.planners import Agent, Progress
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.shown import beside
 from irl_gym.tabular_vec_env import TabularVecEnv
 
 
@@ -72,14 +73,17 @@ def is_file(path: Any) -> bool:
 
 
 def digest(path: str) -> str:
-    """The sha256 of a file."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    """The sha256 of a file, and of what says what an agent in it is shown."""
+    found = hashlib.sha256(Path(path).read_bytes())
+    if beside(path).is_file():
+        found.update(beside(path).read_bytes())
+    return found.hexdigest()
 
 
 def _fitting(agent: Agent, env: gym.Env | VecEnv) -> Agent:
     """The agent, which sees rows if it was trained on them."""
     if isinstance(env, TabularVecEnv) and env.states is not None:
-        if env.shows_rows and agent.model.observation_space == env.observation_space:
+        if agent.states is None and env.shows_rows and agent.model.observation_space == env.observation_space:
             return Agent(agent.model, env.states)
         check_agent(agent, env.states.space, env.action_space)
     else:
@@ -93,7 +97,7 @@ def check_agent(agent: Agent, observations: Any, actions: spaces.Space) -> None:
     Raises:
         DatasetMismatch: it was trained on other observations or actions.
     """
-    found, taken = agent.model.observation_space, agent.model.action_space
+    found, taken = agent.observation_space, agent.model.action_space
     fits = taken == actions and (found == observations or not isinstance(observations, spaces.Discrete))
     cause = None
     try:

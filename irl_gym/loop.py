@@ -29,9 +29,10 @@ from irl_gym import figures, final_stages
 from irl_gym.choices import environment_of
 from irl_gym.claims import claim, write_environment, write_version
 from irl_gym.curves import write_curve
-from irl_gym.datasets import read_minari, write_minari
+from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
+from irl_gym.endings import in_table, left_out
 from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment
@@ -163,8 +164,16 @@ class Loop:
         """The expert's episodes."""
         asked = self.experiment
         if asked.dataset is not None:
-            return list(read_minari(asked.dataset, env=self.env, root=asked.dataset_root))
+            if not isinstance(self.world, TableWorld) or not self.world.table.evidence.exact:
+                return self._given
+            return list(in_table(self._given, self.world.table.mdp, self.world.table.states, asked.after_end))
         return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.folder.path / "dataset"))
+
+    @cached_property
+    def _given(self) -> list[Episode]:
+        """The episodes of the dataset that was given, as they are."""
+        asked = self.experiment
+        return list(read_minari(str(asked.dataset), env=self.env, root=asked.dataset_root, after_end=asked.after_end))
 
     @cached_property
     def certificate(self) -> dict[str, Any]:
@@ -196,7 +205,9 @@ class Loop:
         asked = self.experiment
         if asked.dataset is not None:
             taken = sum(map(len, self.demonstrations))
-            return {"dataset_id": asked.dataset, "episodes": len(self.demonstrations), "steps_recorded": taken}
+            recorded = {"dataset_id": asked.dataset, "episodes": len(self.demonstrations), "steps_recorded": taken}
+            steps = load_minari(asked.dataset, root=asked.dataset_root).total_steps if asked.after_end == "cut" else None
+            return recorded | left_out(self._given, self.demonstrations, steps)
         recorded = self.world.episodes(self.expert, asked.episodes, asked.seed)
         chance = self.world.episodes(self.world.random, asked.eval_episodes, asked.seed)
         dataset_id = dataset_name(str(asked.env_id))

@@ -28,6 +28,8 @@ Add = Callable[[int, Episode], None]
 Writer = Callable[[Path, spaces.Space, int], contextlib.AbstractContextManager[Add]]
 """Opens a folder for episodes with observations of a space, whose actions start at a number."""
 
+ENDING = "irl_gym_ending"
+"""Name of `Episode.ending` in the metadata of an episode; not there where the last observation was seen."""
 LONGEST_ARROW = 131_072
 """Rows of an Arrow episode that Minari reads as one; it would take a longer one for two."""
 _low: Any = h5py  # what its high level is made of, which type checkers do not see
@@ -48,6 +50,16 @@ def _columns(episode: Episode, first_action: int) -> dict[str, Any]:
     }
 
 
+def _metadata(number: int, episode: Episode) -> dict[str, Any]:
+    """What is told of an episode."""
+    told: dict[str, Any] = {"id": number, "total_steps": len(episode)}
+    if episode.seed is not None:
+        told["seed"] = episode.seed
+    if episode.ending != "seen":
+        told[ENDING] = episode.ending
+    return told
+
+
 @contextlib.contextmanager
 def _hdf5(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
     # 1.10's format: a third of the size of the oldest, which h5py takes by default, and every library since 2016 reads it.
@@ -59,10 +71,8 @@ def _hdf5(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
         def add(number: int, episode: Episode) -> None:
             target.check()
             group = file.create_group(f"episode_{number}")
-            group.attrs["id"] = number
-            if episode.seed is not None:
-                group.attrs["seed"] = episode.seed
-            group.attrs["total_steps"] = len(episode)
+            for name, value in _metadata(number, episode).items():
+                group.attrs[name] = value
             for name, values in _columns(episode, first_action).items():
                 _put(group, name, values)
             group.create_group("infos")
@@ -164,10 +174,7 @@ def _arrow(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
         batch = pa.RecordBatch.from_pydict(columns)
         with pa.OSFile(str(place / "part-0.arrow"), "wb") as file, pa.ipc.new_file(file, batch.schema) as writer:
             writer.write_batch(batch)
-        about = {"id": number, "total_steps": len(episode)}
-        if episode.seed is not None:
-            about["seed"] = episode.seed
-        (place / "metadata.json").write_text(json.dumps(about))
+        (place / "metadata.json").write_text(json.dumps(_metadata(number, episode)))
 
     yield add
 

@@ -32,6 +32,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.mdp import TabularMDP, check_discount
 from irl_gym.own_files import write_bytes
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
+from irl_gym.shown import Normaliser, read_shown, write_shown
 from irl_gym.states import StateIndex, States
 from irl_gym.tabular_vec_env import TabularVecEnv
 from irl_gym.tabulate import tabulate
@@ -110,6 +111,25 @@ class Agent:
     """The model; everything SB3 offers is there."""
     states: States | None = None
     """Turns observations into the rows that the model was trained on; None where it was trained on observations."""
+    normaliser: Normaliser | None = None
+    """Does to observations what VecNormalize did while the model was trained; None for nothing."""
+
+    @property
+    def observation_space(self) -> spaces.Space:
+        """Of the environment that it acts in."""
+        return self.model.observation_space if self.states is None else self.states.space
+
+    def shown(self, observation: Any) -> Any:
+        """An observation, or a batch, as the model was shown it.
+
+        Raises:
+            UnknownObservation: an observation that `states` does not hold.
+            InvalidParameter: statistics of observations of another shape.
+        """
+        if self.states is not None:
+            batched = self.states.is_batch(observation)
+            return self.states.encode_batch(observation) if batched else self.states.encode(observation)
+        return observation if self.normaliser is None else self.normaliser(observation)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
@@ -117,16 +137,15 @@ class Agent:
         """SB3's `predict`, on one thread: networks this small are slower on more.
 
         Raises:
-            UnknownObservation: an observation that `states` does not hold.
+            UnknownObservation, InvalidParameter: as `shown`.
         """
-        if self.states is not None:
-            batched = self.states.is_batch(observation)
-            observation = self.states.encode_batch(observation) if batched else self.states.encode(observation)
+        observation = self.shown(observation)
         with _torch_threads(1):
             return self.model.predict(observation, state, episode_start, deterministic)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write SB3's zip. Beside first, then renamed."""
+        """Write SB3's zip, and beside it what the model is shown, if not observations. Beside first, then renamed."""
+        write_shown(Path(path), self.states, self.normaliser)
         content = io.BytesIO()  # torch would raise errors of its own where the disk is full
         self.model.save(content)
         write_bytes(path, content.getvalue())
@@ -138,7 +157,8 @@ def load_agent(path: str | os.PathLike, algorithm: Algorithm, states: States | N
     Args:
         path: the zip.
         algorithm: "PPO", "DQN" or "A2C".
-        states: of the table, for an agent that was trained on its rows.
+        states: of the table, for an agent that was trained on its rows; None for what the file beside the zip says
+            (`irl_gym.shown`).
 
     Raises:
         FileNotFoundError: no such file.
@@ -147,8 +167,9 @@ def load_agent(path: str | os.PathLike, algorithm: Algorithm, states: States | N
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist: expected an agent's zip, as SB3 writes it.")
+    numbered, normaliser = read_shown(path)
     try:
-        return Agent(_algorithm(algorithm).load(path, device="cpu"), states)
+        return Agent(_algorithm(algorithm).load(path, device="cpu"), states or numbered, normaliser)
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile, RuntimeError, AttributeError, TypeError) as error:
         raise InvalidParameter(f"{path} holds no {algorithm} agent ({error}): expected SB3's zip of one.") from error
 

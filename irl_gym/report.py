@@ -11,6 +11,7 @@ from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.confirmation import loss_told
+from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import as_interval
 from irl_gym.optimality import AT_STAKE
@@ -34,6 +35,7 @@ def render(report: Report) -> Iterator[RenderableType]:
     """The parts of the report, in reading order."""
     yield _asked(report)
     yield _policies(report)
+    yield from _lost(report)
     yield _reward(report)
     yield _stages(report)
     yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics, figures and films."
@@ -62,6 +64,14 @@ def _asked(report: Report) -> str:
         hidden = ", ".join(f"{name} ({n} values)" for name, n in report.shown.items())
         told.append(f"shown beside the observation, since the environment hides it: {hidden}")
     return "; ".join(told) + "."
+
+
+def _lost(report: Report) -> Iterator[RenderableType]:
+    """What the dataset lacks, or what of it was not taken; nothing where that is nothing."""
+    told = report.metrics["demonstrations"]
+    lost = [f"{told[key]:,} {words}" for key, words in LOST.items() if told.get(key)]
+    if lost:
+        yield f"Of the {told['episodes']:,} episodes learned from: {'; '.join(lost)}."
 
 
 def _recorded_in(report: Report) -> str:

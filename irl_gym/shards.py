@@ -1,8 +1,9 @@
 """Episodes kept in a folder, a closed file for some at a time, so that what is written is never lost.
 
-A shard is an npz of columns, all its episodes one after the other: lengths, ends, seeds, actions, rewards, and the parts of the
-observations. It is written beside its place and renamed. When a folder is opened, every shard is read against its checksums; a
-damaged one, and those after it, are set aside under names that end in `.damaged`, and their episodes are missing again.
+A shard is an npz of columns, all its episodes one after the other: lengths, ends, seeds, endings (those of earlier versions
+have none), actions, rewards, and the parts of the observations. It is written beside its place and renamed. When a folder is
+opened, every shard is read against its checksums; a damaged one, and those after it, are set aside under names that end in
+`.damaged`, and their episodes are missing again.
 Axes: T steps, N episodes of a shard, M = sum of T.
 """
 
@@ -64,6 +65,7 @@ class Shards:
             "lengths": np.array([len(one) for one in episodes]),
             "terminated": np.array([one.terminated for one in episodes]),
             "truncated": np.array([one.truncated for one in episodes]),
+            "endings": np.array([one.ending for one in episodes]),
             "seeds": np.array([NO_SEED if one.seed is None else one.seed for one in episodes]),
             "actions": np.concatenate([one.actions for one in episodes]),
             "rewards": np.concatenate([np.asarray(one.rewards, dtype=np.float64) for one in episodes]),
@@ -84,10 +86,10 @@ class Shards:
             step = 0
             for i, length in enumerate(columns["lengths"].tolist()):
                 steps, seen = slice(step, step + length), slice(step + i, step + i + length + 1)
-                seed = int(columns["seeds"][i])
+                seed, ending = int(columns["seeds"][i]), str(columns["endings"][i]) if "endings" in columns else "seen"
                 yield Episode(
                     _joined(self.space, columns, seen), columns["actions"][steps], columns["rewards"][steps],
-                    bool(columns["terminated"][i]), bool(columns["truncated"][i]), None if seed == NO_SEED else seed,
+                    bool(columns["terminated"][i]), bool(columns["truncated"][i]), None if seed == NO_SEED else seed, ending,
                 )  # fmt: skip
                 step += length
 

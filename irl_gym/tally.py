@@ -1,5 +1,6 @@
 """What episodes hold of a table: the observations that occur, and how often each step was seen.
 
+A last step whose successor was not recorded (`Episode.ending`) is no step of a table: only its state counts.
 Episodes are read in blocks, so memory grows with the states and transitions that occur, not with the episodes.
 Axes: S states, A actions, M different transitions, n observations of k numbers.
 """
@@ -67,6 +68,11 @@ def tally(episodes: Iterable[Episode], space: spaces.Space, n_actions: int) -> T
         found.add(block)
     if not found.n_episodes:
         raise InvalidDemonstrations("there are no episodes: expected at least one.")
+    if not found.lines:
+        raise InvalidDemonstrations(
+            f"none of the {found.n_episodes} episodes has a step whose successor was recorded: expected one. Give the next "
+            "observations when they are imported."
+        )
     return found.tally()
 
 
@@ -102,14 +108,17 @@ class _Found:
         lasts = np.cumsum(lengths + 1) - 1
         firsts = lasts - lengths
         done = np.zeros(ids.size, dtype=bool)
-        done[lasts] = [episode.terminated for episode in block]
+        done[lasts] = [episode.terminated and episode.ending != "unseen" for episode in block]
         self.started.update(ids[firsts].tolist())
         self.ordinary.update(np.unique(ids[~done]).tolist())
         self.ended.update(np.unique(ids[done]).tolist())
-        pairs = np.delete(ids, lasts) * self.n_actions + actions
-        arrivals = np.delete(ids * 2 + done, firsts)
-        self._add_lines(pairs, arrivals, rewards)
-        self.visits.add(pairs, arrivals, rewards, self.n_episodes + np.repeat(np.arange(len(block)), lengths))
+        known = np.ones(actions.size, dtype=bool)  # steps whose successors are: the last of an episode may not be
+        known[np.cumsum(lengths) - 1] = [episode.ending != "unseen" for episode in block]
+        if known.any():
+            pairs = (np.delete(ids, lasts) * self.n_actions + actions)[known]
+            arrivals, rewards = np.delete(ids * 2 + done, firsts)[known], rewards[known]
+            self._add_lines(pairs, arrivals, rewards)
+            self.visits.add(pairs, arrivals, rewards, self.n_episodes + np.repeat(np.arange(len(block)), lengths)[known])
         self.n_episodes += len(block)
 
     def _numbers(self, block: list[Episode]) -> np.ndarray:

@@ -67,3 +67,29 @@ def strays(case: Case) -> Finding | None:
         beyond,
         flags=flags,
     )
+
+
+def dropped_actions(case: Case) -> Finding | None:
+    """A log without its last observations may have lost its last actions on the way: a goal's, and what it paid."""
+    told = case.judged.get("demonstrations", {})
+    if not told.get("dropped"):
+        return None
+    return Finding(
+        "dropped-actions",
+        f"The last action of {told['dropped']:,} of {told['episodes']:,} episodes was dropped when they were imported, with "
+        "what it paid: what the expert does there was not learned, and its value is that of the episodes without it.",
+        "Import them again with last='keep', the default; or with next observations, where the log has them.",
+    )
+
+
+def unseen_ends(case: Case) -> Finding | None:
+    """Sums of features along an episode need every state; where the last was not recorded, they end with the one before."""
+    told = case.judged.get("demonstrations", {})
+    if not told.get("unseen") or case.judges_states:
+        return None
+    return Finding(
+        "unseen-ends",
+        f"{told['unseen']:,} of {told['episodes']:,} episodes do not say what their last action led to: the values of the "
+        "expert that this learner compares end with the state before.",
+        "Give the next observations when they are imported, or a last row without an action (last='row').",
+    )

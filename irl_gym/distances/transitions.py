@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.demonstrations import Episode
+from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDistance
 from irl_gym.features import batch_size, by_part, take
 from irl_gym.mdp import check_discount
@@ -58,7 +58,7 @@ class Transitions:
 
     @classmethod
     def from_episodes(cls, episodes: Iterable[Episode]) -> "Transitions":
-        """Every step of some episodes; an episode is a group.
+        """Every step of some episodes whose successor is known; an episode is a group.
 
         Raises:
             InvalidDemonstrations: something else than episodes.
@@ -69,6 +69,7 @@ class Transitions:
             raise InvalidDemonstrations(
                 f"there is a {type(wrong).__name__} where an episode is expected: give Episodes, such as those of `collect`."
             )
+        kept = seen_parts(kept)
         if not kept:
             raise UndefinedDistance("there are no episodes: expected at least one, with two transitions or more.")
         return cls(

@@ -10,7 +10,8 @@
 Each gives `Episode`s, which learners take and `write_minari` stores. Every row is checked before the first episode is given
 (the stream's, episode by episode), so nothing is half-imported; the first that cannot be right is named, with its value. What
 they are checked against is `env`, or `space` with `n_actions` (actions count from 0) or `action_space` (they count from its
-start). Logs seldom hold the observation after the last action; `irl_gym.imports.rows` says what `last` does about it. Rewards
+start). Logs seldom hold the observation after the last action: the action is kept all the same, and
+`irl_gym.imports.rows` says what else `last` can do. Rewards
 that are not known are 0.0: no learner reads them, and a report pays the expert of such a dataset by the table. Seeds are
 not known, and None.
 """

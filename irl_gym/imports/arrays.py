@@ -28,7 +28,7 @@ def from_arrays(
     ends: Any = None,
     lengths: Any = None,
     episode: Any = None,
-    last: Last = "drop",
+    last: Last = "keep",
     space: spaces.Space | None = None,
     n_actions: int | None = None,
     action_space: spaces.Space | None = None,
@@ -60,8 +60,9 @@ def from_arrays(
         ends: true in the last step of each episode.
         lengths: steps of each episode.
         episode: id of each row's episode.
-        last: what to do where the last observation is missing: "drop" the last action, "repeat" the last observation, or
-            "row", the last row is an observation only; see `irl_gym.imports.rows`. Not read where it is there.
+        last: what to do where the last observation is missing: "keep" the last action, whose successor is then not known,
+            "drop" it, "repeat" the last observation, or "row", the last row is an observation only; see
+            `irl_gym.imports.rows`. Not read where it is there.
         space: of the observations.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start.

@@ -15,13 +15,13 @@ from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.features import by_part
 from irl_gym.imports.reading import Last, reading
-from irl_gym.imports.rows import Rows
+from irl_gym.imports.rows import Rows, say_dropped
 
 
 def from_rollouts(
     buffer: Any,
     *,
-    last: Last = "drop",
+    last: Last = "keep",
     space: spaces.Space | None = None,
     n_actions: int | None = None,
     action_space: spaces.Space | None = None,
@@ -32,14 +32,14 @@ def from_rollouts(
     From a rollout buffer, episodes are cut where `episode_starts` is true, and the first may be the end of an earlier one. Its
     rewards are as the algorithm has them: at a time limit PPO and A2C add the value of what would have followed. A replay
     buffer made with `optimize_memory_usage` lacks last observations, too. Where they are lacking and the last action is
-    dropped, an episode of one step is left out: none of it would remain.
+    dropped, an episode of one step is left out: none of it would remain. The warning counts it.
 
         from_rollouts(model.rollout_buffer, env=env)
 
     Args:
         buffer: of the algorithm, after some steps.
-        last: what to do where there are no next observations: "drop" the last action or "repeat" the last observation of each
-            episode; see `irl_gym.imports.rows`.
+        last: what to do where there are no next observations: "keep" the last action of each episode, whose successor is then
+            not known, "drop" it, or "repeat" the last observation; see `irl_gym.imports.rows`.
         space: of the observations; the buffer's if None.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start. The buffer's if neither is given.
@@ -78,13 +78,15 @@ def from_rollouts(
         starts = column(buffer.episode_starts) != 0
     starts |= time == 0
     following = getattr(buffer, "next_observations", None)
-    rows = _worth_reading(starts, keep_single=following is not None or last == "repeat")
+    rows = _worth_reading(starts, keep_single=following is not None or last in ("keep", "repeat"))
     copy, time = copy[rows], time[rows]  # what `column` reads from here on
-    return Rows(
+    made = Rows(
         how, np.append(np.flatnonzero(starts[rows]), len(rows)), lambda row: f"copy {copy[row]}, step {time[row]} (from 0)",
         column(buffer.observations), column(buffer.actions), column(buffer.rewards),
         next_observations=None if following is None else column(following), **{key: flag[rows] for key, flag in flags.items()},
-    ).episodes()  # fmt: skip
+    ).cut()  # fmt: skip
+    say_dropped(sum(one.ending == "dropped" for one in made), len(made), int(starts.sum()) - len(made))
+    return made
 
 
 def _worth_reading(starts: np.ndarray, keep_single: bool) -> np.ndarray:
@@ -93,7 +95,7 @@ def _worth_reading(starts: np.ndarray, keep_single: bool) -> np.ndarray:
     rows = np.flatnonzero(np.repeat((lengths > 1) | keep_single, lengths))
     if not rows.size:
         raise InvalidDemonstrations(
-            "every episode in the buffer has one step, and what it led to is not there: expected two. Pass last='repeat'."
+            "every episode in the buffer has one step, and what it led to is not there: expected two. Pass last='keep'."
         )
     return rows
 

@@ -42,7 +42,7 @@ def from_frame(
     terminated: str | None = "terminated",
     truncated: str | None = "truncated",
     next_observation: Any = None,
-    last: Last = "drop",
+    last: Last = "keep",
     space: spaces.Space | None = None,
     n_actions: int | None = None,
     action_space: spaces.Space | None = None,
@@ -68,8 +68,9 @@ def from_frame(
             reward and truncated it may be missing where it is not named.
         truncated: true in the last row of an episode that a time limit ended.
         next_observation: like `observation`: what was seen after the action.
-        last: what to do without `next_observation`: "drop" the last action of each episode, "repeat" its last observation, or
-            "row", the last row of each is an observation only, and its action is left empty; see `irl_gym.imports.rows`.
+        last: what to do without `next_observation`: "keep" the last action of each episode, whose successor is then not known,
+            "drop" it, "repeat" the last observation, or "row", the last row of each is an observation only, and its action is
+            left empty; see `irl_gym.imports.rows`.
         space: of the observations.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start.

@@ -15,7 +15,7 @@ from gymnasium import spaces
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.imports.reading import Last, Reading, reading
-from irl_gym.imports.rows import Rows
+from irl_gym.imports.rows import Rows, say_dropped
 from irl_gym.imports.values import truths
 
 FIELDS = ("observation", "action", "reward", "episode", "terminated", "truncated")
@@ -26,7 +26,7 @@ def from_pairs(
     pairs: Iterable[Any],
     *,
     fields: Sequence[str] | None = None,
-    last: Last = "drop",
+    last: Last = "keep",
     space: spaces.Space | None = None,
     n_actions: int | None = None,
     action_space: spaces.Space | None = None,
@@ -43,8 +43,9 @@ def from_pairs(
     Args:
         pairs: tuples of (observation, action) or (observation, action, reward), or of `fields`.
         fields: what the tuples hold, in order, out of observation, action, reward, episode, terminated, truncated.
-        last: what to do where an episode ends without its last observation: "drop" the last action, "repeat" the last
-            observation, or "row", the last pair's action means nothing; see `irl_gym.imports.rows`.
+        last: what to do where an episode ends without its last observation: "keep" the last action, whose successor is then
+            not known, "drop" it, "repeat" the last observation, or "row", the last pair's action means nothing; see
+            `irl_gym.imports.rows`.
         space: of the observations.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start.
@@ -62,7 +63,16 @@ def from_pairs(
     known = all(one in FIELDS and names.count(one) == 1 for one in names)
     if fields is not None and not (known and set(FIELDS[:2]) <= set(names)):
         raise InvalidParameter(f"fields are {fields!r}: expected observation, action and others of {FIELDS}, once each.")
-    return _episodes(pairs, tuple(names), how)
+    return _counted(_episodes(pairs, tuple(names), how))
+
+
+def _counted(episodes: Iterator[Episode]) -> Iterator[Episode]:
+    """The same episodes; when they have all been given, one line says how many lost their last action."""
+    dropped = given = 0
+    for episode in episodes:
+        dropped, given = dropped + (episode.ending == "dropped"), given + 1
+        yield episode
+    say_dropped(dropped, given)
 
 
 def _episodes(pairs: Iterable[Any], fields: tuple[str, ...], how: Reading) -> Iterator[Episode]:
@@ -134,5 +144,5 @@ def _episode(steps: list[dict[str, Any]], first: int, how: Reading) -> Episode:
     (episode,) = Rows(
         how, np.array([0, len(steps)]), name, [step["observation"] for step in steps],
         np.array(actions, dtype=object) if how.last == "row" else actions, **columns,
-    ).episodes()  # fmt: skip
+    ).cut()  # fmt: skip
     return episode

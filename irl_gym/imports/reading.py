@@ -6,7 +6,7 @@ starts where its action space does; an `Episode` counts from 0. An action space 
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import gymnasium as gym
 from gymnasium import spaces
@@ -14,7 +14,7 @@ from gymnasium import spaces
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, NotDiscrete
 
-Last = Literal["drop", "repeat", "row"]
+Last = Literal["keep", "drop", "repeat", "row"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +31,16 @@ class Reading:
     """A."""
     first_action: int = 0
     """What the source calls action 0."""
-    last: Last = "drop"
+    last: Last = "keep"
     """What to do where an episode's last observation is missing; see `irl_gym.imports.rows`."""
     noun: str = "episode"
     """What the source calls an episode."""
 
     def __post_init__(self) -> None:
-        if self.last not in ("drop", "repeat", "row"):
+        if self.last not in get_args(Last):
             raise InvalidParameter(
-                f"last is {self.last!r}: expected 'drop', 'repeat' or 'row', what to do where an episode's last observation is "
-                "missing."
+                f"last is {self.last!r}: expected 'keep', 'drop', 'repeat' or 'row', what to do where an episode's last "
+                "observation is missing."
             )
 
 
@@ -49,7 +49,7 @@ def reading(
     n_actions: int | None,
     action_space: spaces.Space | None,
     env: gym.Env | None,
-    last: Last = "drop",
+    last: Last = "keep",
     noun: str = "episode",
 ) -> Reading:
     """Make one of what the caller of `from_*` gave; what is named beside `env` counts before what `env` has.

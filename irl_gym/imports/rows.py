@@ -2,32 +2,38 @@
 
 A log has a row for each step: the observation seen, the action taken then, what it paid, and perhaps whether it ended the
 episode. Axes: n rows, N episodes, row after row and episode after episode. An `Episode` of T steps needs T + 1 observations,
-and the commonest logs hold T: the observation that the last action led to was never written. There are four cases, and nobody
+and the commonest logs hold T: the observation that the last action led to was never written. There are five cases, and nobody
 but the person who imports can tell which; `last` says it:
 
     next observations given   nothing is missing: the episode has every row's pair and ends in the last next observation
-    last="drop", the default  the last action of an episode, whose successor is unknown, is left out. Nothing is invented: all
-                              that is kept was seen. It costs one pair an episode, and what that pair paid: often all there is,
-                              as FrozenLake pays at the end. Where rewards matter, give next observations or "repeat"
-    last="repeat"             every pair is kept, and the last observation stands in for its unknown successor. A policy may be
-                              estimated from such an episode; a table of transitions should not be
+    last="keep", the default  every pair is kept, with what it paid and its end. What the last action led to is not known:
+                              `Episode.ending` is "unseen", the last observation stands in its place, and nobody counts it. A
+                              policy is learned from every pair; transitions and sums of features end a step earlier, but where
+                              an exact table has one successor only, which a run then takes
+    last="drop"               the last action of an episode is left out, with what it paid and the end that it made: often all
+                              there is, as FrozenLake pays at the end. A warning says how many; a run and the doctor repeat it
+    last="repeat"             the last observation is what the last action led to, as where a goal is not left
     last="row"                the last row of an episode is its last observation, and its action and reward are not read
 
-With "drop" and "repeat" an episode counts as truncated, whatever its flags say: the step that ended it is not in it, or its end
-is not known. Where a log has no flags, or an episode stops without one, it counts as truncated too.
+With "drop" and "repeat" an episode counts as truncated, whatever its flags say: the step that ended it is not in it, or led to
+no end. Where a log has no flags, or an episode stops without one, it counts as truncated too.
 """
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from irl_gym.demonstrations import Episode
+from irl_gym.demonstrations import Ending, Episode
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.features import batch_size, by_part, take
 from irl_gym.imports.members import members
-from irl_gym.imports.reading import Reading
+from irl_gym.imports.reading import Last, Reading
 from irl_gym.imports.values import Name, is_list, numbers, truths
+
+ENDINGS: dict[Last, Ending] = {"keep": "unseen", "drop": "dropped", "repeat": "seen", "row": "seen"}
+"""How episodes end without next observations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +61,12 @@ class Rows:
     """n observations."""
 
     def episodes(self) -> list[Episode]:
+        """Check every row, then cut; say in one line what is dropped. Errors as `cut`."""
+        made = self.cut()
+        say_dropped(sum(one.ending == "dropped" for one in made), len(made))
+        return made
+
+    def cut(self) -> list[Episode]:
         """Check every row, then cut.
 
         Raises:
@@ -75,21 +87,22 @@ class Rows:
             successors = self._observations(self.next_observations, "next observation")
             self._check_linked(batch, successors)
             finals = take(successors, self._lasts)
-        elif self.how.last == "repeat":
+        elif self.how.last in ("keep", "repeat"):
             finals = take(batch, self._lasts)
         else:
             self._check_longer_than_one(lengths)
+        ending = "seen" if self.next_observations is not None else ENDINGS[self.how.last]
         offsets = self.offsets  # of the observations
         if finals is not None:  # put in after the rows of each episode
             batch = by_part(lambda part, final: np.insert(part, self.offsets[1:], final, axis=0), batch, finals)
             offsets = offsets + np.arange(len(offsets))
-        if self.next_observations is None and not self._only_observed:  # then the step that ended it is not known
+        if self.next_observations is None and self.how.last in ("drop", "repeat"):  # then the step that ended it is not known
             terminated = np.zeros_like(terminated)
         bounds = zip(self.offsets.tolist(), offsets.tolist(), offsets[1:].tolist(), strict=False)
         episodes = []
         for (row, start, stop), ended, limited in zip(bounds, terminated.tolist(), truncated.tolist(), strict=True):
             steps, seen = slice(row, row + stop - start - 1), take(batch, slice(start, stop))
-            episodes.append(Episode(seen, actions[steps], rewards[steps], ended, limited or not ended))
+            episodes.append(Episode(seen, actions[steps], rewards[steps], ended, limited or not ended, ending=ending))
         return episodes
 
     @property
@@ -180,7 +193,7 @@ class Rows:
     def _check_longer_than_one(self, lengths: np.ndarray) -> None:
         if (lengths < 2).any():
             first = int(self.offsets[np.argmax(lengths < 2)])
-            mend = "Leave the episode out." if self._only_observed else "Give the next observations, or pass last='repeat'."
+            mend = "Leave the episode out." if self._only_observed else "Give the next observations, or pass last='keep'."
             raise InvalidDemonstrations(
                 f"{self.name(first)} is the only row of its episode, which has no steps without its last action "
                 f"(last={self.how.last!r}): expected at least two rows. {mend}"
@@ -197,6 +210,23 @@ class Rows:
                 f"{self.name(row)} has another next observation than the observation of {self.name(row + 1)}, which follows it "
                 "in the same episode: expected the same. Are rows missing, or does an episode end there?"
             )
+
+
+def say_dropped(dropped: int, episodes: int, left_out: int = 0) -> None:
+    """Warn, in one line, of last actions that are dropped, and of episodes of which nothing is left; of none, nothing.
+
+    Args:
+        dropped: episodes that lose their last action.
+        episodes: all that are made.
+        left_out: episodes of one step, which are not.
+    """
+    if dropped or left_out:
+        rest = f", and {left_out} of one step {'is' if left_out == 1 else 'are'} left out" if left_out else ""
+        warnings.warn(
+            f"the last action of {dropped} of {episodes} episodes is dropped, with what it paid{rest}: give next observations, "
+            "or last='keep', the default, which keeps it.",
+            stacklevel=4,
+        )
 
 
 def _differ(left: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -100,7 +100,7 @@ def _timed_out(infos: Any) -> bool:
 def from_d4rl(
     source: Mapping[str, Any] | str | os.PathLike,
     *,
-    last: Last = "drop",
+    last: Last = "keep",
     space: spaces.Space | None = None,
     n_actions: int | None = None,
     action_space: spaces.Space | None = None,
@@ -111,12 +111,12 @@ def from_d4rl(
     A row in which `terminals` is true ends an episode by termination, one in which `timeouts` is true by truncation, and what
     follows the last of them is an unfinished episode. `timeouts` and `rewards` may be missing.
 
-        from_d4rl({"observations": [0, 4, 0], "actions": [1, 1, 2], "terminals": [False, True, True]}, last="repeat", env=env)
+        from_d4rl({"observations": [0, 4, 0], "actions": [1, 1, 2], "terminals": [False, True, True]}, env=env)
 
     Args:
         source: a dictionary of arrays, or the path of an HDF5 file that holds them.
-        last: what to do where there are no `next_observations`: "drop" the last action or "repeat" the last observation of each
-            episode; see `irl_gym.imports.rows`.
+        last: what to do where there are no `next_observations`: "keep" the last action of each episode, whose successor is then
+            not known, "drop" it, or "repeat" the last observation; see `irl_gym.imports.rows`.
         space: of the observations.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.demonstrations import Episode
+from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.errors import InvalidDemonstrations
 
 
@@ -58,7 +58,8 @@ def usable(episodes: Iterable[Episode], asked: int, limit: int | None) -> Usable
 
     An episode that did not end and is shorter than the horizon was cut. Where the time limit cut it, which many share, the
     horizon comes down to the limit, for policies too; where it broke off for itself, as the last one of a recording that was
-    stopped, it is dropped: it says nothing of what comes after.
+    stopped, it is dropped: it says nothing of what comes after. An episode whose last observation was not recorded ends with
+    the one before.
 
     Args:
         episodes: the expert's.
@@ -68,7 +69,13 @@ def usable(episodes: Iterable[Episode], asked: int, limit: int | None) -> Usable
     Raises:
         InvalidDemonstrations: no episodes, other things than episodes, or none that can be taken.
     """
-    every = checked_episodes(episodes)
+    given = checked_episodes(episodes)
+    every = seen_parts(given)
+    if not every:
+        raise InvalidDemonstrations(
+            f"all {len(given)} episodes have one step, and what it led to was not recorded: expected two states of one. "
+            "Give the next observations when they are imported."
+        )
     cuts = [len(one) for one in every if not one.terminated and len(one) < asked]
     shared = max(cuts, key=lambda length: (cuts.count(length), length), default=0)  # the most frequent
     if limit is None and (cuts.count(shared) > 1 or len(cuts) == len(every)):
@@ -80,7 +87,7 @@ def usable(episodes: Iterable[Episode], asked: int, limit: int | None) -> Usable
             f"all {len(every)} episodes break off before step {horizon}, most after {shared} steps, and none ended: "
             f"expected some that ended or go on. Ask for a shorter horizon, such as {shared}."
         )
-    return Usable(kept, horizon, len(every) - len(kept))
+    return Usable(kept, horizon, len(given) - len(kept))
 
 
 def checked_episodes(episodes: Any) -> list[Episode]:

@@ -94,8 +94,28 @@ def test_padded_episodes_of_a_step_stay_so():
     assert len(from_arrays(np.array([[0, 4], [0, 1]]), np.array([[1], [2]]), terminated=[True, False], **LAKE)) == 2
 
 
+LOG = {"rewards": [[1, 2, 3], [4, 5]], "terminated": True}
+
+
+def test_the_last_action_is_kept_with_what_it_paid_and_its_end():
+    episodes = from_arrays([[0, 4, 8], [0, 1]], [[1, 1, 3], [2, 0]], **LOG, **LAKE)
+    assert seen(episodes) == [([0, 4, 8, 8], [1, 1, 3], True, False), ([0, 1, 1], [2, 0], True, False)]
+    assert [(one.rewards.tolist(), one.ending) for one in episodes] == [([1.0, 2.0, 3.0], "unseen"), ([4.0, 5.0], "unseen")]
+
+
+def test_an_episode_of_one_row_is_kept():
+    assert seen(from_arrays([[0], [0, 1]], [[1], [2, 2]], **LAKE))[0] == ([0, 0], [1], False, True)
+
+
+def test_drop_says_what_it_drops_and_the_mend():
+    with pytest.warns(UserWarning, match="the last action of 2 of 2 episodes is dropped, with what it paid: .* last='keep'"):
+        from_arrays([[0, 4, 8], [0, 1]], [[1, 1, 3], [2, 0]], last="drop", **LAKE)
+
+
+@pytest.mark.filterwarnings("ignore:the last action of")
 def test_drop_leaves_out_the_last_action_and_the_end_it_made():
-    episodes = from_arrays([[0, 4, 8], [0, 1]], [[1, 1, 3], [2, 0]], rewards=[[1, 2, 3], [4, 5]], terminated=True, **LAKE)
+    episodes = from_arrays([[0, 4, 8], [0, 1]], [[1, 1, 3], [2, 0]], last="drop", **LOG, **LAKE)
+    assert [one.ending for one in episodes] == ["dropped", "dropped"]
     assert seen(episodes) == [([0, 4, 8], [1, 1], False, True), ([0, 1], [2], False, True)]
     assert [one.rewards.tolist() for one in episodes] == [[1.0, 2.0], [4.0]]
 
@@ -179,7 +199,12 @@ REFUSED = {
     "padded too long": (np.zeros((1, 3)), np.zeros((1, 2)), {"lengths": [3]}, "has 3 steps: expected at most 2"),
     "episodes mixed": ([0, 4, 8], [1, 1, 2], {"episode": [1, 2, 1]}, r"row 2 \(from 0\) goes back to episode 1"),
     "no ends": ([0, 4, 8, 9], [1, 1, 2], {}, "expected ends, lengths or episode"),
-    "only row": ([[0], [0, 1]], [[1], [2, 2]], {}, "episode 0, step 0 .* is the only row of its episode"),
+    "only row": (
+        [[0], [0, 1]],
+        [[1], [2, 2]],
+        {"last": "drop"},
+        "episode 0, step 0 .* is the only row of its episode.* last='keep'",
+    ),
     "a jump": ([0, 4], [1, 1], {"next_observations": [5, 8], "lengths": [2]}, r"row 0 .* another next observation .* row 1"),
     "flat row": ([0, 4, 99], [1, 1, 2], {"lengths": [3]}, r"row 2 \(from 0\) has observation 99"),
 }
@@ -198,7 +223,7 @@ def test_two_ways_to_cut_are_refused():
 
 
 def test_an_unknown_rule_is_refused(unchecked):
-    with pytest.raises(InvalidParameter, match="last is 'guess': expected 'drop', 'repeat' or 'row'"):
+    with pytest.raises(InvalidParameter, match="last is 'guess': expected 'keep', 'drop', 'repeat' or 'row'"):
         from_arrays([0, 4], [1, 1], lengths=[2], last="guess", **LAKE)
 
 

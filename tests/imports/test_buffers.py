@@ -66,7 +66,9 @@ def test_a_replay_buffer_that_is_not_full_is_read_as_far_as_it_is():
 
 
 def test_a_replay_buffer_without_last_observations_follows_the_rule():
-    episodes = from_rollouts(replay(copies=1, optimize_memory_usage=True, handle_timeout_termination=False), last="drop")
+    buffer = replay(copies=1, optimize_memory_usage=True, handle_timeout_termination=False)
+    with pytest.warns(UserWarning, match="the last action of 3 of 3 episodes is dropped"):
+        episodes = from_rollouts(buffer, last="drop")
     overwritten = [([1, 2], [1], False), ([3, 4, 5], [3, 0], False), ([6, 7], [2], False)]
     assert seen(episodes) == overwritten
 
@@ -83,12 +85,19 @@ def test_dictionaries_are_read():
 
 
 @pytest.mark.parametrize("used", [False, True], ids=["as collected", "after an update"])
-def test_a_rollout_buffer_drops_each_last_action(used):
+def test_a_rollout_buffer_drops_each_last_action_when_told(used):
     buffer = rollout()
     if used:
         next(buffer.get(4))  # flattens the arrays
     dropped = [(observations[:-1], actions[:-1], False) for observations, actions, _ in PLAYED]
-    assert seen(from_rollouts(buffer)) == dropped + shifted(dropped, 1)
+    with pytest.warns(UserWarning, match="the last action of 6 of 6 episodes is dropped"):
+        assert seen(from_rollouts(buffer, last="drop")) == dropped + shifted(dropped, 1)
+
+
+def test_a_rollout_buffer_keeps_each_last_action():
+    episodes = from_rollouts(rollout(copies=1))
+    assert [one.actions.tolist() for one in episodes] == [actions for _, actions, _ in PLAYED]
+    assert {(one.ending, one.truncated) for one in episodes} == {("unseen", True)}
 
 
 def test_a_rollout_buffer_repeats_each_last_observation_when_told():
@@ -97,18 +106,19 @@ def test_a_rollout_buffer_repeats_each_last_observation_when_told():
     assert all(one.observations[-1] == one.observations[-2] and one.truncated for one in episodes)
 
 
-def test_a_rollout_episode_of_one_step_is_left_out_unless_repeated():
+def test_a_rollout_episode_of_one_step_is_left_out_where_its_action_is_dropped_and_counted():
     buffer = rollout(copies=1)
     buffer.episode_starts[7] = 1  # the last row begins an episode
-    assert [len(one) for one in from_rollouts(buffer)] == [2, 2]
-    assert [len(one) for one in from_rollouts(buffer, last="repeat")] == [3, 3, 1, 1]
+    with pytest.warns(UserWarning, match="the last action of 2 of 2 episodes is dropped, .*, and 2 of one step are left out"):
+        assert [len(one) for one in from_rollouts(buffer, last="drop")] == [2, 2]
+    assert [len(one) for one in from_rollouts(buffer)] == [3, 3, 1, 1]
 
 
 def test_a_rollout_of_single_steps_is_refused():
     buffer = rollout(copies=1)
     buffer.episode_starts[:] = 1
     with pytest.raises(InvalidDemonstrations, match="every episode in the buffer has one step"):
-        from_rollouts(buffer)
+        from_rollouts(buffer, last="drop")
 
 
 class Watched(gym.Wrapper):
@@ -140,15 +150,15 @@ def test_what_dqn_played_comes_back():
     assert {one.truncated for one in episodes} == {True, False}
 
 
-def test_what_ppo_played_comes_back_without_the_ends():
+def test_what_ppo_played_comes_back_but_for_the_last_observations():
     env = Watched(gym.make("CartPole-v1"))
     model = PPO("MlpPolicy", DummyVecEnv([lambda: env]), n_steps=128, batch_size=64, n_epochs=1, seed=0, device="cpu").learn(
         128
     )
     episodes = from_rollouts(model.rollout_buffer, env=env)
-    played = [one for one in env.played if len(one[1]) > 1]
-    assert [one.actions.tolist() for one in episodes] == [actions[:-1] for _, actions in played]
-    assert all(np.array_equal(one.observations, seen[:-1]) for one, (seen, _) in zip(episodes, played, strict=True))
+    played = [one for one in env.played if one[1]]
+    assert [one.actions.tolist() for one in episodes] == [actions for _, actions in played]
+    assert all(np.array_equal(one.observations[:-1], seen[:-1]) for one, (seen, _) in zip(episodes, played, strict=True))
 
 
 def test_no_buffer_is_refused():

@@ -60,7 +60,7 @@ def test_commas_in_a_tsv_are_refused(read):
 
 @pytest.mark.parametrize("text", ["\n \n" + LOG, "\ufeff" + LOG, LOG.replace("\n", "\r\n")])
 def test_blank_lines_and_marks_before_the_header_do_no_harm(text, read):
-    assert [one.actions.tolist() for one in read(text)] == [[1, 1]]
+    assert [one.actions.tolist() for one in read(text)] == [[1, 1, 2]]
 
 
 def test_the_ending_may_be_in_capitals(read):
@@ -70,12 +70,12 @@ def test_the_ending_may_be_in_capitals(read):
 def test_columns_may_be_named_by_numbers(read):
     text = "run,0,1,2\n0,0,0,1\n0,1,4,1\n"
     (episode,) = read(text, episode="run", step="0", observation="1", action="2", terminated=None)
-    assert episode.observations.tolist() == [0, 4]
+    assert episode.observations.tolist() == [0, 4, 4]
 
 
 def test_a_column_without_a_name_is_called_as_pandas_calls_it(read):
     (episode,) = read(LOG.replace("step", ""), step="Unnamed: 1")
-    assert episode.actions.tolist() == [1, 1]
+    assert episode.actions.tolist() == [1, 1, 2]
 
 
 def test_two_columns_of_one_name_in_a_file_are_refused(read):
@@ -132,7 +132,7 @@ def test_a_text_that_is_missing_in_the_first_row_is_named(read):
 def test_numbers_and_their_texts_in_one_column_of_a_frame_are_read():
     frame = pd.DataFrame({"episode": 0, "step": [0, 1], "observation": pd.Series(["0", 4], dtype=object), "action": 1})
     (episode,) = from_frame(frame, **LAKE)
-    assert episode.observations.tolist() == [0, 4]
+    assert episode.observations.tolist() == [0, 4, 4]
 
 
 @pytest.mark.parametrize(

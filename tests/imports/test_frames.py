@@ -34,15 +34,28 @@ def seen(episodes):
 
 
 def test_a_file_becomes_episodes(log):
-    assert seen(from_frame(log(), terminated="done", **LAKE)) == [([0, 4, 8], [1, 1], [0, 0], False), ([0, 1], [2], [0], False)]
+    assert seen(from_frame(log(), terminated="done", **LAKE)) == [
+        ([0, 4, 8, 8], [1, 1, 2], [0, 0, 1], True),
+        ([0, 1, 1], [2, 3], [0, 0.5], False),
+    ]
 
 
 def test_a_file_is_also_named_by_text(log):
     assert len(from_frame(str(log()), **LAKE)) == 2
 
 
-def test_repeat_keeps_the_last_action(log):
-    assert [one.actions.tolist() for one in from_frame(log(), last="repeat", **LAKE)] == [[1, 1, 2], [2, 3]]
+def test_repeat_takes_the_last_observation_for_what_the_last_action_led_to(log):
+    episodes = from_frame(log(), last="repeat", terminated="done", **LAKE)
+    assert [(one.actions.tolist(), one.ending, one.terminated) for one in episodes] == [
+        ([1, 1, 2], "seen", False),
+        ([2, 3], "seen", False),
+    ]
+
+
+def test_drop_leaves_out_the_last_action_and_says_so(log):
+    with pytest.warns(UserWarning, match="the last action of 2 of 2 episodes is dropped"):
+        episodes = from_frame(log(), last="drop", terminated="done", **LAKE)
+    assert seen(episodes) == [([0, 4, 8], [1, 1], [0, 0], False), ([0, 1], [2], [0], False)]
 
 
 def test_next_observations_keep_the_last_action_and_its_end(log):
@@ -73,7 +86,7 @@ def test_episodes_may_have_names(log):
 def test_columns_may_have_any_names(log):
     path = log(LOG.replace("observation", "cell").replace("action", "move").replace("episode", "run").replace("step", "t"))
     episodes = from_frame(path, episode="run", step="t", observation="cell", action="move", reward=None, **LAKE)
-    assert [one.rewards.tolist() for one in episodes] == [[0.0, 0.0], [0.0]]
+    assert [one.rewards.tolist() for one in episodes] == [[0.0, 0.0, 0.0], [0.0, 0.0]]
 
 
 @pytest.mark.parametrize("texts", [["(13, 10, 0)", "(20, 10, 1)"], ["[13 10  0]", "[20 10 1]"], ["13;10;False", "20;10;True"]])
@@ -81,14 +94,14 @@ def test_text_is_read_as_numbers(texts):
     space = spaces.Tuple([spaces.Discrete(32), spaces.Discrete(11), spaces.Discrete(2)])
     frame = pd.DataFrame({"episode": 0, "step": [0, 1], "observation": texts, "action": [1, 0]})
     (one,) = from_frame(frame, reward=None, space=space, n_actions=2)
-    assert [part.tolist() for part in one.observations] == [[13, 20], [10, 10], [0, 1]]
+    assert [part.tolist() for part in one.observations] == [[13, 20, 20], [10, 10, 10], [0, 1, 1]]
 
 
 def test_lists_in_parquet_are_vectors(tmp_path):
     frame = pd.DataFrame({"episode": 0, "step": [0, 1], "observation": [[0.5, 1.5], [-0.25, 2.0]], "action": [1, 0]})
     frame.to_parquet(tmp_path / "log.parquet")
     (one,) = from_frame(tmp_path / "log.parquet", reward=None, space=spaces.Box(-3, 3, (2,), np.float32), n_actions=2)
-    assert one.observations.tolist() == [[0.5, 1.5], [-0.25, 2.0]]
+    assert one.observations.tolist() == [[0.5, 1.5], [-0.25, 2.0], [-0.25, 2.0]]
 
 
 def test_nullable_columns_are_read(log):
@@ -127,7 +140,6 @@ REFUSED = {
     "flag": (swap(1, "0,0,0,1,0.0,7"), r"^row 1 \(line 2 .*\) has terminated 7"),
     "flag empty": (swap(2, "0,1,4,1,0.0,"), r"^row 2 \(line 3 .*\) has terminated nan"),
     "flag text": (swap(2, "0,1,4,1,0.0,maybe"), r"^row 2 \(line 3 .*\) has terminated 'maybe'"),
-    "only row": (swap(5, "2,1,1,3,0.5,False"), r"^row 4 \(line 5 .*\) is the only row of its episode"),
     "short row": (swap(2, "0,1,4"), r"^row 2 \(line 3 .*\) has action nan"),
     "long row": (swap(2, "0,1,4,1,0.0,False,9,9"), "line 3"),
     "all rows long": ("a,b\n1,2,3\n1,2,3\n", "more fields than its header|no column"),
@@ -249,7 +261,7 @@ def test_a_log_without_rewards_is_read(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("episode,step,observation,action\n0,0,0,1\n0,1,4,1\n0,2,8,2\n")
     (episode,) = from_frame(path, space=spaces.Discrete(16), n_actions=4)
-    assert (episode.rewards.tolist(), episode.terminated) == ([0.0, 0.0], False)
+    assert (episode.rewards.tolist(), episode.terminated) == ([0.0, 0.0, 0.0], False)
 
 
 def test_a_column_named_terminated_is_read_without_being_asked_for(tmp_path):

@@ -24,7 +24,13 @@ def test_a_pair_without_action_is_the_last_observation():
 
 def test_none_ends_an_episode():
     pairs = [None, (0, 1), (4, 1), None, None, (0, 2), (1, 1)]
-    assert seen(from_pairs(pairs, **LAKE)) == [([0, 4], [1], False), ([0, 1], [2], False)]
+    assert seen(from_pairs(pairs, **LAKE)) == [([0, 4, 4], [1, 1], False), ([0, 1, 1], [2, 1], False)]
+
+
+def test_drop_leaves_out_last_actions_and_counts_them_at_the_end():
+    with pytest.warns(UserWarning, match="the last action of 2 of 2 episodes is dropped"):
+        dropped = seen(from_pairs([(0, 1), (4, 1), None, (0, 2), (1, 1)], last="drop", **LAKE))
+    assert dropped == [([0, 4], [1], False), ([0, 1], [2], False)]
 
 
 def test_repeat_keeps_the_last_action():
@@ -81,7 +87,6 @@ def test_one_episode_is_in_memory_at_a_time():
         ([7], r"pair 0 .* is 7"),
         ([(0, 1, 1.0), (4, 1, None), (8, 1, 0.0), (9, None)], "pair 1 .* has no reward"),
         ([(0, 1, 1.0), (4, 1, np.inf), (9, None)], "pair 1 .* has reward inf"),
-        ([(0, 1), None, (0, 1), (4, 1)], "pair 0 .* is the only row of its episode"),
         ([(8, None)], "pair 0 .* is the only row of its episode"),
         ([([0, 1], 1), (4, 1)], r"pair 1 .* of shape \(\)"),
     ],

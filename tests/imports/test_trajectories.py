@@ -69,9 +69,9 @@ def test_terminals_and_timeouts_end_episodes_and_the_rest_is_unfinished():
 
 
 def test_without_next_observations_the_rule_holds():
-    episodes = from_d4rl(FLAT, last="repeat", **LAKE)
+    episodes = from_d4rl(FLAT, **LAKE)
     assert [one.observations.tolist() for one in episodes] == [[0, 4, 4], [0, 1, 1], [5, 5]]
-    assert [one.terminated for one in episodes] == [False, False, False]
+    assert [(one.terminated, one.ending) for one in episodes] == [(True, "unseen"), (False, "unseen"), (False, "unseen")]
 
 
 def test_a_column_of_actions_is_read():
@@ -91,12 +91,16 @@ def test_a_column_of_actions_is_read():
         ({"observations": [0, 4, 0]}, "there are 3 observations: expected 5"),
         ({"rewards": [0, 4, 0]}, r"rewards have shape \(3,\): expected \(5,\)"),
         ({"terminals": [0, 0, 2, 0, 0]}, "row 2 .* has terminated 2"),
-        ({}, "row 4 .* is the only row of its episode, .* pass last='repeat'"),
     ],
 )
 def test_arrays_that_cannot_be_right_are_refused(change, message):
     with pytest.raises(InvalidDemonstrations, match=message):
         from_d4rl(FLAT | change, **LAKE)
+
+
+def test_an_episode_of_one_row_has_none_without_its_last_action():
+    with pytest.raises(InvalidDemonstrations, match=r"row 4 .* is the only row of its episode, .* pass last='keep'"):
+        from_d4rl(FLAT, last="drop", **LAKE)
 
 
 def test_a_missing_array_offers_the_closest():

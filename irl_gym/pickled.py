@@ -1,0 +1,187 @@
+"""A pickle read as data: nothing in it is imported, called or built, whatever it names.
+
+`pickle.load` runs what a file says. Here its opcodes, as the standard library's `pickletools` lists them, are carried out on
+plain values only: a name stays a name, and a call stays a record of what would have been called. Numbers and arrays of NumPy
+are then recognised in such records. What is not of this kind is refused.
+"""
+
+import pickletools
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+MOST_BYTES = 64 << 20
+"""Of a pickle that is read."""
+
+
+@dataclass(frozen=True)
+class Name:
+    """What would have been imported."""
+
+    module: str
+    """Where from."""
+    name: str
+    """What."""
+
+
+@dataclass(eq=False)
+class Call:
+    """What would have been called, and put into what came of it."""
+
+    maker: Any
+    """A Name, in every pickle that Python writes."""
+    args: Any
+    """Its arguments."""
+    state: Any = None
+    """Given to `__setstate__`, or the attributes."""
+    items: list[Any] = field(default_factory=list)
+    """Appended."""
+
+    def is_of(self, name: str, *modules: str) -> bool:
+        """Does it call this name of one of these modules?"""
+        return isinstance(self.maker, Name) and self.maker.name == name and self.maker.module in modules
+
+
+_MARK = object()
+_VALUES = {
+    "INT", "BININT", "BININT1", "BININT2", "LONG", "LONG1", "LONG4", "FLOAT", "BINFLOAT", "STRING", "BINSTRING",
+    "SHORT_BINSTRING", "UNICODE", "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "BINBYTES", "SHORT_BINBYTES", "BINBYTES8",
+    "BYTEARRAY8",
+}  # fmt: skip
+"""Opcodes that push the value beside them."""
+_MULTIARRAY = ("numpy.core.multiarray", "numpy._core.multiarray")
+_NUMERIC = ("numpy.core.numeric", "numpy._core.numeric")
+_KINDS = "biuf"
+
+
+def read_pickle(raw: bytes) -> Any:
+    """The content: numbers, texts, bytes, lists, tuples, dictionaries, and a Call for everything else.
+
+    Raises:
+        ValueError: no pickle, too large, or one with opcodes that plain data have no need of.
+    """
+    if len(raw) > MOST_BYTES:
+        raise ValueError(f"it has {len(raw):,} bytes: expected {MOST_BYTES:,} at most")
+    machine = _Machine()
+    try:
+        for opcode, argument, _ in pickletools.genops(raw):
+            if opcode.name == "STOP":
+                return machine.stack[-1]
+            machine.step(opcode.name, argument)
+    except (IndexError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise ValueError(f"it is no pickle of plain data ({type(error).__name__})") from error
+    raise ValueError("it ends before its end")
+
+
+class _Machine:
+    """The stack and the memo."""
+
+    def __init__(self) -> None:
+        self.stack: list[Any] = []
+        self.memo: dict[int, Any] = {}
+
+    def step(self, name: str, argument: Any) -> None:
+        """Carry out an opcode."""
+        stack = self.stack
+        if name in _VALUES:
+            stack.append(argument)
+        elif name in ("NONE", "NEWTRUE", "NEWFALSE"):
+            stack.append({"NONE": None, "NEWTRUE": True, "NEWFALSE": False}[name])
+        elif name.startswith("EMPTY_"):
+            stack.append({"EMPTY_LIST": [], "EMPTY_TUPLE": (), "EMPTY_DICT": {}, "EMPTY_SET": []}[name])
+        elif name == "MARK":
+            stack.append(_MARK)
+        elif name == "POP":
+            stack.pop()
+        elif name in ("TUPLE", "LIST", "DICT", "FROZENSET"):
+            found = self._marked()
+            made = {"TUPLE": tuple, "LIST": list, "FROZENSET": list}.get(name)
+            stack.append(dict(_pairs(found)) if made is None else made(found))
+        elif name in ("TUPLE1", "TUPLE2", "TUPLE3"):
+            count = int(name[-1])
+            stack[-count:] = [tuple(stack[-count:])]
+        elif name in ("APPEND", "APPENDS", "ADDITEMS", "SETITEM", "SETITEMS"):
+            self._put(name)
+        elif name in ("MEMOIZE", "PUT", "BINPUT", "LONG_BINPUT"):
+            self.memo[len(self.memo) if name == "MEMOIZE" else int(argument)] = stack[-1]
+        elif name in ("GET", "BINGET", "LONG_BINGET"):
+            stack.append(self.memo[int(argument)])
+        elif name not in ("PROTO", "FRAME"):
+            self._call(name, argument)
+
+    def _marked(self) -> list[Any]:
+        """What stands behind the last mark."""
+        at = len(self.stack) - 1 - self.stack[::-1].index(_MARK)
+        found = self.stack[at + 1 :]
+        del self.stack[at:]
+        return found
+
+    def _put(self, name: str) -> None:
+        pairs = name.startswith("SETITEM")
+        if name.endswith("S"):
+            found = self._marked()
+        else:
+            found = self.stack[-2:] if pairs else self.stack[-1:]
+            del self.stack[-len(found) :]
+        target = self.stack[-1]
+        if pairs and isinstance(target, dict):
+            target.update(_pairs(found))
+        else:
+            (target.items if isinstance(target, Call) else target).extend(found)
+
+    def _call(self, name: str, argument: Any) -> None:
+        stack = self.stack
+        if name == "GLOBAL":
+            module, _, what = str(argument).partition(" ")
+            stack.append(Name(module, what))
+        elif name == "STACK_GLOBAL":
+            module, what = stack.pop(-2), stack.pop()
+            stack.append(Name(str(module), str(what)))
+        elif name in ("REDUCE", "NEWOBJ"):
+            args, maker = stack.pop(), stack.pop()
+            stack.append(Call(maker, args))
+        elif name == "BUILD":
+            state = stack.pop()
+            if not isinstance(stack[-1], Call):
+                raise ValueError("it gives a state to what has none")
+            stack[-1].state = state
+        else:
+            raise ValueError(f"it has the opcode {name}: expected plain data")
+
+
+def _pairs(flat: list[Any]) -> list[tuple[Any, Any]]:
+    return list(zip(flat[::2], flat[1::2], strict=True))
+
+
+def as_numbers(found: Any) -> np.ndarray:
+    """A number, or an array of NumPy, out of what `read_pickle` gave.
+
+    Raises:
+        ValueError: anything else.
+    """
+    if isinstance(found, bool | int | float):
+        return np.asarray(found, dtype=np.float64)
+    try:
+        if isinstance(found, Call) and found.is_of("_reconstruct", *_MULTIARRAY):
+            _, shape, dtype, fortran, raw = found.state
+            return _array(raw, dtype, shape, "F" if fortran else "C")
+        if isinstance(found, Call) and found.is_of("_frombuffer", *_NUMERIC):
+            raw, dtype, shape, order = found.args
+            return _array(raw, dtype, shape, order)
+        if isinstance(found, Call) and found.is_of("scalar", *_MULTIARRAY):
+            dtype, raw = found.args
+            return _array(raw, dtype, (), "C")
+    except (TypeError, OverflowError) as error:
+        raise ValueError(f"it has an array that is none ({error})") from error
+    raise ValueError(f"it has {type(found).__name__} where a number or an array is expected")
+
+
+def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
+    """An array of its bytes."""
+    if not isinstance(dtype, Call) or not dtype.is_of("dtype", "numpy") or not isinstance(raw, bytes | bytearray):
+        raise ValueError("it has an array without numbers")
+    kind, byteorder = str(dtype.args[0]), str((dtype.state or (3, "="))[1])
+    if kind[:1] not in _KINDS or kind[1:] not in ("1", "2", "4", "8") or byteorder not in ("<", ">", "=", "|"):
+        raise ValueError(f"it has an array of {kind}: expected numbers")
+    return np.frombuffer(bytes(raw), dtype=byteorder + kind).reshape(tuple(map(int, shape)), order="F" if order == "F" else "C")

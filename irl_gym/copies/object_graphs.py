@@ -13,7 +13,8 @@ import io
 import pickle
 import types
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -113,12 +114,27 @@ class References:
             one = waiting.pop()
             if id(one) in self._numbers:
                 continue
-            if type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic):
+            if one is value or (type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic)):
                 self.refer(one)
             for part in children(one):
                 if type(part) not in ATOMS and id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
+
+    @contextmanager
+    def standing_for(self, known: Mapping[int, Any]) -> Iterator[None]:
+        """For a while, refer to these objects, given by their ids, as to the known ones that they stand for."""
+        added = {one: self._numbers[id(other)] for one, other in known.items() if id(other) in self._numbers}
+        self._numbers.update(added)
+        try:
+            yield
+        finally:
+            for one in added:
+                del self._numbers[one]
+
+    def memo(self) -> dict[int, Any]:
+        """For `copy.deepcopy`: what is referred to is not copied."""
+        return {id(one): one for one in self.objects} | {one: self.objects[number] for one, number in self._numbers.items()}
 
     def forget(self) -> None:
         """Refer to nothing any more."""
@@ -146,6 +162,20 @@ class References:
             raise anew(one)
         self._plain.add(kind)
         return None
+
+
+def twins(one: Any, other: Any) -> dict[int, Any] | None:
+    """The id of each object inside a value -> what is in its place inside another; None where that is built otherwise."""
+    found, waiting = {id(one): other}, [(one, other)]
+    while waiting:
+        first, second = ([*children(value)] for value in waiting.pop())
+        if len(first) != len(second):
+            return None
+        for a, b in zip(first, second, strict=True):
+            if a is not b and type(a) not in ATOMS and id(a) not in found:
+                found[id(a)] = b
+                waiting.append((a, b))
+    return found
 
 
 class Pairs:

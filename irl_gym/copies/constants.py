@@ -15,7 +15,7 @@ import gymnasium as gym
 
 from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.layer_state import LayerState
-from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, References, anew, attributes
+from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, References, Steps, anew, attributes, reached
 from irl_gym.copies.stripped import GENERATORS, layers, replace_generators
 from irl_gym.errors import NotEnumerable, NotTabular
 
@@ -35,8 +35,8 @@ class Home:
     """Of the chain, the outermost first."""
     name: str
     """As a person writes it, such as `FrameStack.world['map']`."""
-    steps: tuple[tuple[bool, Any], ...]
-    """From the layer to the part: is it an item, or an attribute; its key or name."""
+    steps: Steps
+    """From the layer to the part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +52,7 @@ class Constant:
 
     def now(self) -> Any:
         """What stands in its place."""
-        value: Any = self.state.layer
-        for item, key in self.home.steps:
-            try:
-                value = value[key] if item else getattr(value, key)
-            except (LookupError, AttributeError, TypeError):
-                return ABSENT
-        return value
+        return reached(self.state.layer, self.home.steps)
 
     def of(self, names: frozenset[str]) -> bool:
         """Is it named here, or part of what is?"""

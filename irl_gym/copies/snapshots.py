@@ -20,7 +20,19 @@ import gymnasium as gym
 from irl_gym.copies.calls import called
 from irl_gym.copies.constants import Constant, Home, digest_of, found_in, unchanging
 from irl_gym.copies.layer_state import LayerState
-from irl_gym.copies.object_graphs import ABSENT, CODE, REFUSALS, Pairs, References, Twin, attributes, twins
+from irl_gym.copies.object_graphs import (
+    ABSENT,
+    CODE,
+    REFUSALS,
+    Difference,
+    Pairs,
+    References,
+    Twin,
+    attributes,
+    put,
+    reached,
+    twins,
+)
 from irl_gym.copies.stripped import awaken_generators, duplicate, layers, replace_generators
 from irl_gym.errors import InvalidParameter, NotEnumerable, NotTabular
 
@@ -102,7 +114,7 @@ class Snapshots:
 
     def restore(self, state: Any) -> None:
         """Make the environment what it was when this state was taken."""
-        held = called(lambda: self._references.loads(state)) if isinstance(state, bytes) else self._copied(state.held).held
+        held = self._held(state)
         for place, values in zip(self._places, held, strict=False):
             place.write(values)
         if self._own is not None:
@@ -112,9 +124,18 @@ class Snapshots:
         """The same inner state? Equal bytes are; else the contents decide: orders in a set, or shared strings, do not count."""
         return a is b or (isinstance(a, bytes) and a == b) or next(self._unlike(a, b), None) is None
 
-    def differences(self, a: Any, b: Any) -> list[str]:
-        """What differs between two states, for a person: `["step_count: 3 against 7"]`, the first state's value first."""
+    def differences(self, a: Any, b: Any) -> list[Difference]:
+        """What differs between two states, in words `step_count: 3 against 7`, the first state's value first."""
         return list(self._unlike(a, b))
+
+    def crossed(self, a: Any, b: Any, part: Difference) -> Any | None:
+        """The first state with one part of the second; None where it cannot be put there."""
+        first, second = self._held(a), self._held(b)
+        try:
+            put(first, part.steps, reached(second, part.steps))
+            return self._references.dumps(first) if isinstance(a, bytes) else self._copied(first)
+        except (LookupError, NotEnumerable, NotTabular, *REFUSALS):
+            return None
 
     def changed_constants(self) -> list[str]:
         """The constants that are none, since contents changed. `include` them, in snapshots of a fresh copy."""
@@ -181,13 +202,18 @@ class Snapshots:
                 "Give the environment get_state() and set_state(state)."
             ) from error
 
-    def _unlike(self, a: Any, b: Any) -> Iterator[str]:
+    def _held(self, state: Any) -> list[dict[str, Any]]:
+        """What a state holds, as new objects."""
+        return called(lambda: self._references.loads(state)) if isinstance(state, bytes) else self._copied(state.held).held
+
+    def _unlike(self, a: Any, b: Any) -> Iterator[Difference]:
         first, second = (self._references.loads(one) if isinstance(one, bytes) else one.held for one in (a, b))
         pairs = Pairs()
         prefixes = [*(place.prefix for place in self._places), ""]
-        for prefix, x, y in zip(prefixes, first, second, strict=False):
+        for i, (prefix, x, y) in enumerate(zip(prefixes, first, second, strict=False)):
             for name in dict.fromkeys([*x, *y]):
-                yield from pairs.unlike(prefix + name, x.get(name, ABSENT), y.get(name, ABSENT))
+                steps = ((True, i), (True, name))
+                yield from pairs.unlike(prefix + name, x.get(name, ABSENT), y.get(name, ABSENT), steps)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

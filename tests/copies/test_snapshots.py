@@ -58,6 +58,11 @@ def walk(env, snapshots, actions):
     return seen
 
 
+def differences(snapshots, state):
+    """What differs between a state and the one now, in words."""
+    return [str(one) for one in snapshots.differences(state, snapshots.take())]
+
+
 def actions_of(env, seed, n=50):
     return np.random.default_rng(seed).integers(env.action_space.n, size=n).tolist()
 
@@ -100,7 +105,7 @@ def test_snapshot_holds_arrays_sets_dataclasses_and_deques():
     env.left.discard(8)
     env.bag.items.append(2)
     env.queue.append(3)
-    assert snapshots.differences(state, snapshots.take()) == [
+    assert differences(snapshots, state) == [
         "cells[1, 2]: np.float64(0.0) against np.float64(5.0)",
         "left: {8, 1} against {1}",
         "bag.items: [1] against [1, 2]",
@@ -115,7 +120,7 @@ def test_restore_removes_attributes_that_appeared_since():
     env, snapshots = snapshots_of(Walk())
     state = snapshots.take()
     env.cache = 3
-    assert snapshots.differences(state, snapshots.take()) == ["cache: absent against 3"]
+    assert differences(snapshots, state) == ["cache: absent against 3"]
     snapshots.restore(state)
     assert not hasattr(env, "cache")
 
@@ -132,14 +137,14 @@ def test_same_tells_a_shared_list_from_an_equal_one():
     env, snapshots = snapshots_of(Walk(a=[1], b=[1]))
     state = snapshots.take()
     env.b = env.a
-    assert snapshots.differences(state, snapshots.take()) == ["b: the same object as another attribute's, in one state only"]
+    assert differences(snapshots, state) == ["b: the same object as another attribute's, in one state only"]
 
 
 def test_differences_name_the_wrapper():
     env, snapshots = snapshots_of(frames())
     state = snapshots.take()
     env.step(0)
-    assert "TimeAwareObservation.timesteps: 0 against 1" in snapshots.differences(state, snapshots.take())
+    assert "TimeAwareObservation.timesteps: 0 against 1" in differences(snapshots, state)
 
 
 def test_snapshot_holds_functions_and_local_classes_by_reference():
@@ -159,7 +164,7 @@ def test_snapshot_copies_what_cannot_be_pickled():
     actions = actions_of(env, 0)
     first = walk(env, snapshots, actions)
     env.inner.n = 5
-    assert "inner.n: 0 against 5" in snapshots.differences(state, snapshots.take())
+    assert "inner.n: 0 against 5" in differences(snapshots, state)
     for _ in range(2):  # the copy is not used up
         snapshots.restore(state)
         assert env.inner.n == 0
@@ -304,7 +309,7 @@ def test_snapshots_use_get_state_and_set_state_of_what_cannot_be_copied():
     first = walk(env, snapshots, actions)
     snapshots.restore(state)
     assert walk(env, snapshots, actions) == first
-    assert any(line.startswith("state[0]: ") for line in snapshots.differences(state, snapshots.take()))
+    assert any(line.startswith("state[0]: ") for line in differences(snapshots, state))
 
 
 class Mended(Walk):

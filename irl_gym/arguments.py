@@ -1,5 +1,6 @@
 """What the loop's command line asks for, group by group, and the experiment that it stands for."""
 
+import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -241,19 +242,24 @@ class Arguments:
 
 
 def parse_reveal(parts: Sequence[str]) -> Reveals:
-    """What is to be revealed, given as text: "known", "none", or name=number of values ...
+    """What is to be revealed, given as text: "known", "none", or name=number of values or name=[value, value] ...
 
     Raises:
         InvalidParameter: anything else.
     """
     if list(parts) in ([KNOWN], ["none"], []):
         return KNOWN if list(parts) == [KNOWN] else {}
-    found = {}
+    found: dict[str, int | list[Any]] = {}
     for part in parts:
-        name, equals, number = part.partition("=")
-        if not equals or not number.isdecimal():
+        name, equals, values = part.partition("=")
+        try:
+            read = ast.literal_eval(values)
+        except (ValueError, SyntaxError, RecursionError, MemoryError):
+            read = None
+        if not equals or not (values.isdecimal() or isinstance(read, list)):
             raise InvalidParameter(
-                f"reveal has {part!r}: expected name=number of values, such as step_count=100; or known, or none."
+                f"reveal has {part!r}: expected name=number of values, such as step_count=100, or a list of them, such as "
+                "last=[None,0,1]; or known, or none."
             )
-        found[name] = int(number)
+        found[name] = read if isinstance(read, list) else int(values)
     return found

@@ -1,12 +1,13 @@
-"""Checks of arguments that many places share: a number in a range, an array of floats, a sparse matrix."""
+"""Checks of arguments that many places share: a number in a range, an array of floats, a sparse matrix, discrete actions."""
 
 import numbers
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from gymnasium import spaces
 
-from irl_gym.errors import InvalidInput, InvalidParameter
+from irl_gym.errors import InvalidInput, InvalidParameter, IrlGymError, NotDiscrete
 
 LARGEST = 1e300
 """Sums of larger numbers overflow."""
@@ -143,3 +144,35 @@ def float_array(name: str, value: Any, expected: str, error: type[InvalidInput])
         raise error(
             f"{name} is {type(value).__name__} that cannot be read as numbers ({reason}): expected {expected}."
         ) from reason
+
+
+def discrete_actions(
+    space: spaces.Space, what: str = "the action space", error: type[IrlGymError] = NotDiscrete
+) -> spaces.Discrete:
+    """Return a space of actions that are one number, as it is.
+
+    Raises:
+        NotDiscrete: any other, with the wrapper that makes it one; or the error of the class given.
+    """
+    if isinstance(space, spaces.Discrete):
+        return space
+    raise error(f"{what} is {space}: expected Discrete. {_made_discrete(space)}")
+
+
+def _made_discrete(space: spaces.Space) -> str:
+    wrappers = "gymnasium.wrappers"
+    if isinstance(space, spaces.MultiDiscrete | spaces.MultiBinary):
+        counts = space.nvec if isinstance(space, spaces.MultiDiscrete) else np.full(space.shape, 2)
+        shape = tuple(counts.ravel().tolist())
+        least = np.ravel(space.start).tolist() if isinstance(space, spaces.MultiDiscrete) else []
+        several = f"numpy.array(numpy.unravel_index(n, {shape}))" + (f" + {least}" if any(least) else "")
+        several = f"({several}).reshape{space.shape}" if len(space.shape) > 1 else several
+        number = f"gymnasium.spaces.Discrete({int(np.prod(counts, dtype=object))})"
+        return f"Number its combinations, with `{wrappers}.TransformAction(env, lambda n: {several}, {number})`."
+    if isinstance(space, spaces.Box):
+        if np.isfinite(space.low).all() and np.isfinite(space.high).all():
+            return f"Take some of them, such as 5 along each axis, with `{wrappers}.DiscretizeAction(env, 5)`."
+        box = f"gymnasium.spaces.Box(-1, 1, {space.shape}, numpy.{space.dtype})"
+        bounded = f"{wrappers}.TransformAction(env, lambda action: action, {box})"
+        return f"Bound them and take some, such as 5 along each axis, with `{wrappers}.DiscretizeAction({bounded}, 5)`."
+    return f"Turn a number into such an action with a function of yours, in `{wrappers}.TransformAction`."

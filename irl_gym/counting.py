@@ -19,12 +19,12 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.demonstrations import Episode, stacked
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter, NotDiscrete
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.listed_states import ListedStates
 from irl_gym.mdp import TabularMDP, check_discount, entry_rows
 from irl_gym.policies import Policy, generator
@@ -219,11 +219,10 @@ def interact(env: gym.Env, steps: int, *, seed: int, policy: Policy | None = Non
         NotTabular: the environment raised an error, or a step did not return five values.
         InvalidParameter: fewer than 1 steps, or a negative seed.
     """
-    if not isinstance(env.action_space, spaces.Discrete):
-        raise NotDiscrete(f"the action space is {env.action_space}: expected Discrete. Discretise the actions first.")
+    n_actions = int(discrete_actions(env.action_space).n)
     checked_number("steps", steps, "a number of steps of at least 1", least=1, whole=True)
     checked_number("seed", seed, "a whole number of at least 0", least=0, whole=True)
-    choose = _random_actions(int(env.action_space.n), generator(seed)) if policy is None else _actions_of(policy)
+    choose = _random_actions(n_actions, generator(seed)) if policy is None else _actions_of(policy)
     return _episodes(env, int(steps), int(seed), choose)
 
 

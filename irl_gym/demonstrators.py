@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym._typing import Matrix
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.choices import PlannerName, planner_named
 from irl_gym.demonstrations import Episode, collect, collect_from_table
 from irl_gym.dynamic_programming import value_iteration
@@ -174,10 +174,8 @@ class Recording:
             InvalidPolicy: a table of actions of another size.
             DatasetMismatch: an agent of another environment.
         """
-        space, limit = env.action_space, min(step_limit(env), self.max_episode_steps or step_limit(env))
-        if not isinstance(space, spaces.Discrete):
-            raise NotDiscrete(f"the actions are {space}: expected Discrete. Wrap it in Gymnasium's DiscretizeAction.")
-        n_actions = int(space.n)
+        limit = min(step_limit(env), self.max_episode_steps or step_limit(env))
+        n_actions = int(discrete_actions(env.action_space).n)
         table = self._table(env)
         if self.expert == "random" and table is None:
             return Stepped(env, lambda seed: _random(env, n_actions, seed), limit, self.seed, deterministic=True)

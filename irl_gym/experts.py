@@ -24,6 +24,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from irl_gym._typing import Matrix
 from irl_gym.archives import read_settings
+from irl_gym.checks import discrete_actions
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy, NotDiscrete
 from irl_gym.features import batch_size, take
 from irl_gym.noise import boltzmann, checked_count, checked_temperature
@@ -66,10 +67,7 @@ class Acting:
         Raises:
             NotDiscrete: an environment whose actions are not Discrete.
         """
-        actions = env.action_space
-        if not isinstance(actions, spaces.Discrete):
-            raise NotDiscrete(f"the action space is {actions}: expected Discrete. Wrap it in Gymnasium's DiscretizeAction.")
-        return cls(function, int(actions.n), env.observation_space)
+        return cls(function, int(discrete_actions(env.action_space).n), env.observation_space)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
@@ -234,6 +232,4 @@ def _maker(settings: dict[str, Any]) -> Algorithm | None:
 
 
 def _check_discrete(agent: Agent) -> None:
-    space = agent.model.action_space
-    if not isinstance(space, spaces.Discrete):
-        raise NotDiscrete(f"the agent's actions are {space}: expected Discrete. Train it on Gymnasium's DiscretizeAction.")
+    discrete_actions(agent.model.action_space, "the agent's action space")

@@ -11,9 +11,9 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 
-from irl_gym.errors import InvalidParameter, NotDiscrete
+from irl_gym.checks import discrete_actions
+from irl_gym.errors import InvalidParameter
 from irl_gym.names import ACTIONS, of_class
 
 QUIT, AGAIN, HELP = "q", "r", "?"
@@ -84,10 +84,7 @@ def controls_of(env: gym.Env, overrides: str = "") -> Controls:
         NotDiscrete: actions that are not Discrete.
         InvalidParameter: overrides with a key or an action that does not exist, or with one of the three that never are.
     """
-    space = env.action_space
-    if not isinstance(space, spaces.Discrete):
-        raise NotDiscrete(f"the action space is {space}: expected Discrete. Wrap it in Gymnasium's DiscretizeAction.")
-    n = int(space.n)
+    n = int(discrete_actions(env.action_space).n)
     known = of_class(env, ACTIONS, n)
     actions = {key: action for action, name in enumerate(known) for key in KEYS.get(name, ())}
     actions |= {str(action): action for action in range(min(n, 10))}

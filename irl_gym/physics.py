@@ -6,18 +6,19 @@ what `env.step` does. Axes: N states at once, d coordinates.
 """
 
 import copy
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
-from gymnasium.wrappers import DiscretizeAction
+from gymnasium.wrappers import DiscretizeAction, TransformAction
 
 from irl_gym._typing import Choices, Flags, Numbers, Points
+from irl_gym.checks import discrete_actions
 from irl_gym.coordinates import Coordinates, coordinates_of
-from irl_gym.errors import InvalidParameter, NotDiscrete, NotSettable
+from irl_gym.errors import InvalidParameter, NotSettable
 from irl_gym.watching import only_watches
 
 
@@ -210,23 +211,19 @@ class SteppedPhysics:
 
 def _actions(env: gym.Env) -> tuple[Any, ...]:
     """What the unwrapped environment's `step` is given for each action number."""
-    if not isinstance(env.action_space, spaces.Discrete):
-        raise NotDiscrete(
-            f"the action space is {env.action_space}: expected Discrete. Wrap the environment in "
-            "`gymnasium.wrappers.DiscretizeAction(env, bins)` first."
-        )
-    wrapper, translate = env, None
+    space = discrete_actions(env.action_space)
+    wrapper, translations = env, []
     while isinstance(wrapper, gym.Wrapper):
-        if isinstance(wrapper, DiscretizeAction):
-            translate = wrapper.action
+        if isinstance(wrapper, DiscretizeAction | TransformAction):
+            translations.append(wrapper.action)
         elif not only_watches(wrapper):
             raise NotSettable(
                 f"the wrapper {type(wrapper).__name__} changes what the environment does: expected wrappers that only watch or "
-                "limit it, or DiscretizeAction. Take it off, or give the environment that change itself."
+                "limit it, DiscretizeAction or TransformAction. Take it off, or give the environment that change itself."
             )
         wrapper = wrapper.env
-    numbers = range(int(env.action_space.start), int(env.action_space.start + env.action_space.n))
-    return tuple(a if translate is None else translate(a) for a in numbers)
+    numbers = range(int(space.start), int(space.start + space.n))
+    return tuple(functools.reduce(lambda action, translate: translate(action), translations, a) for a in numbers)
 
 
 def _copy_of(env: gym.Env) -> Any:

@@ -85,6 +85,7 @@ def _shown(env: gym.Env) -> Mapping[str, int]:
     """What wrappers show of the state that the environment hides."""
     shown: dict[str, int] = {}
     while isinstance(env, gym.Wrapper):
-        shown |= env.shown if isinstance(env, Reveal) else {}
+        if isinstance(env, Reveal):
+            shown |= {name: n if isinstance(n, int) else len(n) for name, n in env.shown.items()}
         env = env.env
     return shown

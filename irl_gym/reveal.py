@@ -2,7 +2,7 @@
 
 A transition table takes the observation for the state. An environment that remembers more than it shows, such as a counter,
 has no table: two visits to one observation may go on differently. The mend is to show what is hidden, where policies, learned
-rewards and datasets see it too: `Reveal` adds integer attributes of the environment to its observation.
+rewards and datasets see it too: `Reveal` adds attributes of the environment, or parts of them, to its observation.
 
 `KNOWN` lists what is hidden in environments of Gymnasium:
 
@@ -10,9 +10,11 @@ rewards and datasets see it too: `Reveal` adds integer attributes of the environ
     BlackjackEnv, natural=True or sab=True      natural: is the hand an ace and a ten, with no card drawn?
 """
 
+import ast
 import difflib
 import numbers
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +27,7 @@ from gymnasium.envs.toy_text.taxi import TaxiEnv
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, UnknownObservation
 
+ABSENT = object()
 OBSERVATION = "observation"
 """The key of the original observation."""
 
@@ -56,26 +59,34 @@ def known_hidden(env: gym.Env) -> Mapping[str, int]:
     return {name: hidden.n for name, hidden in _known(base).items() if hidden.when(base) and name not in shown}
 
 
+def can_be_shown(name: str) -> bool:
+    """Is it a name that `Reveal` reads, such as goal[1] or agent.energy?"""
+    return re.fullmatch(rf"\w+(?:{_PART.pattern})*", name) is not None
+
+
 class Reveal(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
-    """Adds integer attributes to the observation: {"observation": as it was, name: 0..n-1, ...}.
+    """Adds attributes to the observation, as integers: {"observation": as it was, name: 0..n-1, ...}.
 
     It can be rebuilt from the spec of the environment, as `gym.make(env.spec)` and Minari do.
 
     Args:
         env: any environment.
-        shown: name of an integer or boolean attribute -> number of its values n, which are 0 to n - 1. Attributes are those of
-            `env.unwrapped`, else of a wrapper; a dot leads into an attribute's own, as in "agent.energy". The default is
-            `known_hidden(env)`. Attributes that exist only after `reset` are looked for then.
+        shown: name of an integer or boolean attribute -> number of its values n, which are 0 to n - 1; or a list of its
+            values, such as [None, 0, 1] or ["red", "green"], of which the place in the list is shown. Attributes are those of
+            `env.unwrapped`, else of a wrapper; dots and brackets lead into an attribute, as in "agent.energy", "goal[1]" and
+            "bag['key']". The default is `known_hidden(env)`. Attributes that exist only after `reset` are looked for then.
 
     Raises:
-        InvalidParameter: nothing to show, a count below 1, or a name that is taken.
+        InvalidParameter: nothing to show, a count below 1, a list with a value twice, or a name that is taken.
     """
 
-    def __init__(self, env: gym.Env, shown: Mapping[str, int] | None = None):
-        self.shown: dict[str, int] = _checked_shown(env, known_hidden(env) if shown is None else shown)
+    def __init__(self, env: gym.Env, shown: Mapping[str, int | Sequence[Any]] | None = None):
+        self.shown: dict[str, Any] = _checked_shown(env, known_hidden(env) if shown is None else shown)
         gym.utils.RecordConstructorArgs.__init__(self, shown=self.shown)
         gym.ObservationWrapper.__init__(self, env)
-        parts = {OBSERVATION: env.observation_space} | {name: spaces.Discrete(n) for name, n in self.shown.items()}
+        parts = {OBSERVATION: env.observation_space} | {
+            name: spaces.Discrete(n if isinstance(n, int) else len(n)) for name, n in self.shown.items()
+        }
         self.observation_space = spaces.Dict(parts)
 
     def observation(self, observation: Any) -> dict[str, Any]:
@@ -83,23 +94,46 @@ class Reveal(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
 
         Raises:
             InvalidParameter: an attribute that does not exist or is not an integer.
-            UnknownObservation: a value outside 0..n-1.
+            UnknownObservation: a value outside 0..n-1, or that is not listed.
         """
         return {OBSERVATION: observation} | {name: self._value(name, n) for name, n in self.shown.items()}
 
-    def _value(self, name: str, n: int) -> int:
+    def _value(self, name: str, values: Any) -> int:
         known = _known(self.unwrapped).get(name)
         value = _attribute(self.env, name) if known is None else known.read(self.unwrapped)
-        if not isinstance(value, numbers.Integral | np.bool_):
-            raise InvalidParameter(
-                f"{name} is {str(value)[:90]}, a {type(value).__name__}: expected an integer or a boolean. Give the "
-                "environment an integer attribute that says the same, and show that."
-            )
-        number = int(value)
-        if not 0 <= number < n:
-            mend = f"Say so with shown={{{name!r}: {number + 1}}}" if number >= 0 else "Show an attribute that counts from 0"
-            raise UnknownObservation(f"{name} is {number}: expected 0 to {n - 1}, as n is {n}. {mend}.")
-        return number
+        return _number(name, value, values) if isinstance(values, int) else _place(name, value, values)
+
+
+def _number(name: str, value: Any, n: int) -> int:
+    """A value as a number of 0..n-1."""
+    if not isinstance(value, numbers.Integral | np.bool_):
+        if value is None or isinstance(value, str | float | np.floating):
+            mend = f"List its values, as in shown={{{name!r}: {sorted({None, value}, key=str)!r}}}"
+        elif isinstance(value, dict | Sequence | np.ndarray) and len(value):
+            parts = f"{next(iter(value))!r}" if isinstance(value, dict) else ", ".join("0" * np.ndim(value))
+            mend = f"Show the parts of it, as in {f'{name}[{parts}]'!r}"
+        else:
+            mend = "Give the environment an integer attribute that says the same, and show that"
+        raise InvalidParameter(
+            f"{name} is {str(value)[:90]}, a {type(value).__name__}: expected an integer or a boolean. {mend}."
+        )
+    number = int(value)
+    if not 0 <= number < n:
+        listed = f"List its values, as in shown={{{name!r}: {list(range(number, n))[:99]}}}"
+        mend = f"Say so with shown={{{name!r}: {number + 1}}}" if number >= 0 else listed
+        raise UnknownObservation(f"{name} is {number}: expected 0 to {n - 1}, as n is {n}. {mend}.")
+    return number
+
+
+def _place(name: str, value: Any, values: Sequence[Any]) -> int:
+    """The place of a value among those listed."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    try:
+        return values.index(plain)
+    except ValueError:
+        raise UnknownObservation(
+            f"{name} is {repr(plain)[:90]}: expected one of {list(values)}. List it too, in `shown`."
+        ) from None
 
 
 def _known(base: gym.Env) -> Mapping[str, Hidden]:
@@ -114,17 +148,35 @@ def layers(env: gym.Env) -> Iterator[gym.Env]:
     yield env
 
 
+_PART = re.compile(r"\.(\w+)|\[(-?\d+(?:, ?-?\d+)*|'[^']*'|\"[^\"]*\")\]")
+"""What may follow an attribute's name: `.energy`, `[1]`, `[0, 2]`, `['key']`."""
+
+
 def _attribute(env: gym.Env, name: str) -> Any:
-    """The attribute of a dotted name: of the environment itself, else of the innermost wrapper that has it."""
-    head, *rest = name.split(".")
+    """What a name leads to: an attribute of the environment itself, else of the innermost wrapper that has it; and on."""
+    head = re.match(r"\w*", name).group()  # pyright: ignore[reportOptionalMemberAccess]
     inside_out = [*layers(env)][::-1]
     value: Any = next((layer for layer in inside_out if hasattr(layer, head)), None)
-    if value is None:
+    if value is not None:
+        value = getattr(value, head)
+    else:
+        value = next((layer for layer in inside_out[1:] if type(layer).__name__ == head), None)
+    if value is None and not any(hasattr(layer, head) for layer in inside_out):
         raise _no_attribute(type(env.unwrapped).__name__, head, inside_out)
-    for part in (head, *rest):
-        if not hasattr(value, part):
-            raise _no_attribute(type(value).__name__, part, [value])
-        value = getattr(value, part)
+    for part in _PART.finditer(name, len(head)):
+        attribute, item = part.groups()
+        if attribute is not None:
+            if not hasattr(value, attribute):
+                raise _no_attribute(type(value).__name__, attribute, [value])
+            value = getattr(value, attribute)
+            continue
+        try:
+            value = value[ast.literal_eval(item)]
+        except (LookupError, TypeError) as error:
+            raise InvalidParameter(
+                f"{name[: part.start()]} has no part [{item}] ({type(error).__name__}: {error}): expected one that it has. It "
+                f"is {str(value)[:90]}."
+            ) from error
     return value
 
 
@@ -139,7 +191,7 @@ def _no_attribute(owner: str, name: str, objects: list[Any]) -> InvalidParameter
     return InvalidParameter(f"{owner} has no attribute {name!r}: expected the name of an integer or boolean one. {offer}")
 
 
-def _checked_shown(env: gym.Env, shown: Any) -> dict[str, int]:
+def _checked_shown(env: gym.Env, shown: Any) -> dict[str, Any]:
     if not isinstance(shown, Mapping):
         raise InvalidParameter(
             f"shown is {shown!r}: expected names with their numbers of values, such as {{'fickle_step': 2}}."
@@ -152,10 +204,28 @@ def _checked_shown(env: gym.Env, shown: Any) -> dict[str, int]:
     for name, n in shown.items():
         if not isinstance(name, str) or not name:
             raise InvalidParameter(f"shown has the name {name!r}: expected that of an attribute.")
+        if not can_be_shown(name):
+            raise InvalidParameter(f"shown has the name {name!r}: expected an attribute's, such as agent.energy or goal[1].")
         if name == OBSERVATION:
             raise InvalidParameter(
                 f"shown has the name {name!r}, which is the key of the environment's own observation: expected another. Give "
                 "the attribute a property of another name."
             )
-        checked_number(f"shown[{name!r}]", n, "a whole number of at least 1, the number of its values", least=1, whole=True)
-    return {name: int(n) for name, n in shown.items()}
+        if isinstance(n, list | tuple):
+            _check_listed(name, n)
+        else:
+            expected = "a whole number of at least 1, the number of its values, or a list of them"
+            checked_number(f"shown[{name!r}]", n, expected, least=1, whole=True)
+    return {name: list(n) if isinstance(n, list | tuple) else int(n) for name, n in shown.items()}
+
+
+def _check_listed(name: str, values: Sequence[Any]) -> None:
+    wrong = next((one for one in values if not isinstance(one, bool | int | float | str | None)), ABSENT)
+    if wrong is not ABSENT or not values:
+        raise InvalidParameter(
+            f"shown[{name!r}] lists {'nothing' if wrong is ABSENT else repr(wrong)[:90]}: expected values that are numbers, "
+            "text, true, false or None."
+        )
+    twice = next((one for i, one in enumerate(values) if one in values[:i]), ABSENT)
+    if twice is not ABSENT:
+        raise InvalidParameter(f"shown[{name!r}] lists {twice!r} twice: expected each value once. Leave one out.")

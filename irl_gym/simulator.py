@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.features import FeatureMap, batch_size, checked_features, over_rows
 from irl_gym.linear_reward import LinearReward
@@ -61,11 +61,7 @@ class Simulator:
             )
         if not isinstance(self.planner, Planner):
             raise InvalidParameter(f"planner is {self.planner!r}: expected one with `plan`, such as ValueIteration() or SB3().")
-        if not isinstance(self.env.action_space, spaces.Discrete):
-            raise InvalidParameter(
-                f"the action space is {self.env.action_space}: expected Discrete. Wrap the environment in Gymnasium's "
-                "DiscretizeAction."
-            )
+        discrete_actions(self.env.action_space, error=InvalidParameter)
         if self.table is not None and (
             self.table.states.space != self.env.observation_space or self.table.mdp.n_actions != self.n_actions
         ):

@@ -15,14 +15,13 @@ from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium as gym
-from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.blackjack import blackjack_table
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.copies.calls import seeded_globals
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
+from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotTabular, UnknownEnvironment
 from irl_gym.fresh_episodes import compare_with_episodes
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
@@ -91,11 +90,7 @@ def tabulate(
         raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment, such as gymnasium.make gives.")
     for name, value in (("check_steps", check_steps), ("seed", seed)):
         checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
-    if not isinstance(env.action_space, spaces.Discrete):
-        many = isinstance(env.action_space, spaces.MultiDiscrete | spaces.MultiBinary)
-        mend = "Number its combinations, with a wrapper that turns one number into several"
-        other = "Discretise the actions first, as with `gymnasium.wrappers.DiscretizeAction`"
-        raise NotDiscrete(f"the action space is {env.action_space}: expected Discrete. {mend if many else other}.")
+    discrete_actions(env.action_space)
     learned = _learned_reward(env)
     if by is not None and (isinstance(by, type) or not isinstance(by, By)):
         raise InvalidParameter(

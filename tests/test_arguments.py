@@ -229,6 +229,7 @@ def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(dataset)
         ({"reveal": ("key",)}, InvalidParameter, "reveal has 'key': expected name=number"),
         ({"reveal": ("key=two",)}, InvalidParameter, "reveal has 'key=two'"),
         ({"reveal": ("key=-2",)}, InvalidParameter, "reveal has 'key=-2'"),
+        ({"reveal": ("key=[0, key]",)}, InvalidParameter, r"reveal has 'key=\[0, key\]'"),
         ({"reveal": ("known", "key=2")}, InvalidParameter, "reveal has 'known'"),
         ({"start_seeds": (-1,), "learner": "feature-lp"}, InvalidParameter, "-1"),
         ({"epsilon": 1.5}, InvalidParameter, "epsilon is 1.5"),

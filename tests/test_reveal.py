@@ -26,6 +26,7 @@ class Counter(gym.Env):
 
     def __init__(self, first=0):
         self.part, self.words, self.ratio, self.first, self.limit = Part(), "many", 0.5, first, 9
+        self.last, self.goal, self.bag, self.map = None, (2, 1), {"key": [0, 3]}, np.array([[0, 1], [2, 0]])
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -34,6 +35,7 @@ class Counter(gym.Env):
 
     def step(self, action):
         self.count, self.odd, self.part.energy = self.count + 1, not self.odd, 3
+        self.last = int(action)
         return int(action), 0.0, False, False, {}
 
 
@@ -83,6 +85,38 @@ def test_an_attribute_of_a_wrapper_is_shown():
     env.reset()
     env.step(0)
     assert env.step(0)[0]["_elapsed_steps"] == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("goal[1]", 1), ("goal[-2]", 2), ("bag['key'][1]", 3), ("map[1, 0]", 2), ("map[0][1]", 1)]
+)
+def test_brackets_lead_into_an_attribute(name, value):
+    assert Reveal(Counter(), {name: 4}).reset()[0][name] == value
+
+
+def test_the_name_of_a_wrapper_leads_into_it():
+    env = Reveal(gym.wrappers.TimeAwareObservation(fickle(), normalize_time=False), {"TimeAwareObservation.timesteps": 300})
+    assert walk(env, 3)[-1]["TimeAwareObservation.timesteps"] == 3
+
+
+def test_the_place_of_a_value_among_those_listed_is_shown():
+    env = Reveal(Counter(), {"last": [None, 0, 1], "words": ["few", "many"]})
+    first, second = env.reset()[0], env.step(1)[0]
+    assert (first["last"], second["last"], first["words"]) == (0, 2, 1)
+    assert env.observation_space["last"] == spaces.Discrete(3)
+
+
+def test_a_value_that_is_not_listed_is_refused():
+    env = Reveal(Counter(), {"last": [None, 0]})
+    env.reset()
+    with pytest.raises(UnknownObservation, match=r"last is 1: expected one of \[None, 0\]"):
+        env.step(1)
+
+
+@pytest.mark.parametrize("name", ["goal[7]", "bag['lock']", "first[0]"])
+def test_a_part_that_is_not_there_is_refused(name):
+    with pytest.raises(InvalidParameter, match="has no part"):
+        Reveal(Counter(), {name: 4}).reset()
 
 
 def test_the_state_index_numbers_what_is_shown():
@@ -215,7 +249,7 @@ def test_a_value_that_is_too_large_is_refused_with_the_count_that_holds_it():
 
 def test_a_negative_value_is_refused():
     env = Reveal(Counter(first=-1), {"count": 5})
-    with pytest.raises(UnknownObservation, match=r"count is -1: expected 0 to 4.*counts from 0"):
+    with pytest.raises(UnknownObservation, match=r"count is -1: expected 0 to 4.*shown=\{'count': \[-1, 0, 1, 2, 3, 4\]\}"):
         env.reset()
 
 
@@ -232,6 +266,11 @@ def test_nothing_to_show_is_refused():
         ({"count": 2.5}, r"shown\['count'\] is 2.5"),
         ({"observation": 2}, "'observation', which is the key"),
         ({3: 2}, "has the name 3"),
+        ({"goal[": 2}, r"name 'goal\[': expected an attribute's"),
+        ({"goal[f()]": 2}, r"name 'goal\[f\(\)\]'"),
+        ({"last": []}, "lists nothing"),
+        ({"last": [(1, 2)]}, r"lists \(1, 2\): expected values that are numbers"),
+        ({"last": [1, 0, True]}, "lists True twice"),
         (["count"], r"shown is \['count'\]: expected names with their numbers of values"),
     ],
 )

@@ -13,7 +13,9 @@ import io
 import pickle
 import types
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,8 @@ import numpy as np
 from irl_gym.errors import NotTabular
 
 Twin = Callable[[Any], Any | None]
+Steps = tuple[tuple[bool, Any], ...]
+"""From an object to a part of it: is it an item, or an attribute; its key or name."""
 ATOMS = frozenset({int, float, bool, complex, str, bytes, type(None)})
 CODE = (type, types.FunctionType, types.ModuleType, np.ufunc)
 """Code is no state: functions, classes and modules are shared, as copy.deepcopy shares them."""
@@ -113,12 +117,27 @@ class References:
             one = waiting.pop()
             if id(one) in self._numbers:
                 continue
-            if type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic):
+            if one is value or (type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic)):
                 self.refer(one)
             for part in children(one):
                 if type(part) not in ATOMS and id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
+
+    @contextmanager
+    def standing_for(self, known: Mapping[int, Any]) -> Iterator[None]:
+        """For a while, refer to these objects, given by their ids, as to the known ones that they stand for."""
+        added = {one: self._numbers[id(other)] for one, other in known.items() if id(other) in self._numbers}
+        self._numbers.update(added)
+        try:
+            yield
+        finally:
+            for one in added:
+                del self._numbers[one]
+
+    def memo(self) -> dict[int, Any]:
+        """For `copy.deepcopy`: what is referred to is not copied."""
+        return {id(one): one for one in self.objects} | {one: self.objects[number] for one, number in self._numbers.items()}
 
     def forget(self) -> None:
         """Refer to nothing any more."""
@@ -148,6 +167,42 @@ class References:
         return None
 
 
+def twins(one: Any, other: Any) -> dict[int, Any] | None:
+    """The id of each object inside a value -> what is in its place inside another; None where that is built otherwise."""
+    found, waiting = {id(one): other}, [(one, other)]
+    while waiting:
+        first, second = ([*children(value)] for value in waiting.pop())
+        if len(first) != len(second):
+            return None
+        for a, b in zip(first, second, strict=True):
+            if a is not b and type(a) not in ATOMS and id(a) not in found:
+                found[id(a)] = b
+                waiting.append((a, b))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """A part that two graphs do not share."""
+
+    name: str
+    """As a person writes it: `grid.grid[14].is_open`."""
+    steps: Steps
+    """That lead there; to the array or tuple that it is in, whose parts cannot be set one by one."""
+    first: Any
+    """In one graph; ABSENT where it is not there."""
+    second: Any
+    """In the other."""
+    more: int = 0
+    """Other elements of the same array that differ."""
+    said: str = ""
+    """In the place of the two values."""
+
+    def __str__(self) -> str:
+        told = self.said or f"{shown(self.first)} against {shown(self.second)}"
+        return f"{self.name}: {told}" + (f", and {self.more} more" if self.more else "")
+
+
 class Pairs:
     """A comparison of two graphs of objects, that remembers which object stands for which."""
 
@@ -155,52 +210,75 @@ class Pairs:
         self._forth: dict[int, int] = {}
         self._back: dict[int, int] = {}
 
-    def unlike(self, name: str, a: Any, b: Any) -> Iterator[str]:
-        """What differs between a and b, one line a part: `grid.grid[14].is_open: True against False`."""
+    def unlike(self, name: str, a: Any, b: Any, steps: Steps = ()) -> Iterator[Difference]:
+        """What differs between a and b, part by part."""
         if a is b:
             return
         if type(a) is not type(b) or type(a) in ATOMS or isinstance(a, np.generic | enum.Enum):
             if type(a) is not type(b) or not (a == b or (a != a and b != b)):
-                yield f"{name}: {shown(a)} against {shown(b)}"
+                yield Difference(name, steps, a, b)
             return
         if not isinstance(a, tuple | frozenset):
             if id(a) in self._forth or id(b) in self._back:
                 if self._forth.get(id(a)) != id(b) or self._back.get(id(b)) != id(a):
-                    yield f"{name}: the same object as another attribute's, in one state only"
+                    yield Difference(name, steps, a, b, said="the same object as another attribute's, in one state only")
                 return
             self._forth[id(a)], self._back[id(b)] = id(b), id(a)
-        yield from self._inside(name, a, b)
+        yield from self._inside(name, a, b, steps)
 
-    def _inside(self, name: str, a: Any, b: Any) -> Iterator[str]:
+    def _inside(self, name: str, a: Any, b: Any, steps: Steps) -> Iterator[Difference]:
         own, other = attributes(a), attributes(b)
         if isinstance(a, dict):
-            yield from self._by_key(lambda key: f"{name}[{key!r}]", a, b)
+            for key in dict.fromkeys([*a, *b]):
+                yield from self.unlike(f"{name}[{key!r}]", a.get(key, ABSENT), b.get(key, ABSENT), (*steps, (True, key)))
         elif isinstance(a, SEQUENCES) and len(a) == len(b):
             for place, (x, y) in enumerate(zip(a, b, strict=True)):
-                yield from self.unlike(f"{name}[{place}]", x, y)
+                within = steps if isinstance(a, tuple) else (*steps, (True, place))
+                yield from self.unlike(f"{name}[{place}]", x, y, within)
         elif isinstance(a, np.ndarray):
-            yield from self._arrays(name, a, b)
+            yield from self._arrays(name, a, b, steps)
         elif isinstance(a, (*SEQUENCES, set, frozenset)) or not (own or other):
             if not _equal(a, b):
-                yield f"{name}: {shown(a)} against {shown(b)}"
-        yield from self._by_key(lambda key: f"{name}.{key}", own, other)
+                yield Difference(name, steps, a, b)
+        for key in dict.fromkeys([*own, *other]):
+            yield from self.unlike(f"{name}.{key}", own.get(key, ABSENT), other.get(key, ABSENT), (*steps, (False, key)))
 
-    def _by_key(self, called: Callable[[Any], str], a: dict, b: dict) -> Iterator[str]:
-        for key in dict.fromkeys([*a, *b]):
-            yield from self.unlike(called(key), a.get(key, ABSENT), b.get(key, ABSENT))
-
-    def _arrays(self, name: str, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
+    def _arrays(self, name: str, a: np.ndarray, b: np.ndarray, steps: Steps) -> Iterator[Difference]:
         if a.dtype != b.dtype or a.shape != b.shape:
-            yield f"{name}: {a.dtype} of shape {a.shape} against {b.dtype} of shape {b.shape}"
+            said = f"{a.dtype} of shape {a.shape} against {b.dtype} of shape {b.shape}"
+            yield Difference(name, steps, a, b, said=said)
         elif a.dtype == object:
             for place, x in np.ndenumerate(a):
-                yield from self.unlike(f"{name}[{', '.join(map(str, place))}]", x, b[place])
+                yield from self.unlike(f"{name}[{', '.join(map(str, place))}]", x, b[place], steps)
         elif a.tobytes() != b.tobytes():
             bytewise = (np.frombuffer(one.tobytes(), np.uint8).reshape(*one.shape, one.itemsize) for one in (a, b))
             places = np.argwhere(np.not_equal(*bytewise).any(axis=-1))
             first = tuple(places[0].tolist())
-            more = f", and {len(places) - 1} more" if len(places) > 1 else ""
-            yield f"{name}[{', '.join(map(str, first))}]: {shown(a[first])} against {shown(b[first])}{more}"
+            within = f"{name}[{', '.join(map(str, first))}]" if first else name
+            yield Difference(within, steps, a[first], b[first], more=len(places) - 1)
+
+
+def reached(value: Any, steps: Steps) -> Any:
+    """What steps lead to; ABSENT where they lead nowhere."""
+    for item, key in steps:
+        try:
+            value = value[key] if item else getattr(value, key)
+        except (LookupError, AttributeError, TypeError):
+            return ABSENT
+    return value
+
+
+def put(value: Any, steps: Steps, part: Any) -> None:
+    """Put a part where steps lead, in place; ABSENT takes away what is there. Raises what an object raises that refuses it."""
+    holder, (item, key) = reached(value, steps[:-1]), steps[-1]
+    if part is ABSENT and item:
+        del holder[key]
+    elif part is ABSENT:
+        delattr(holder, key)
+    elif item:
+        holder[key] = part
+    else:
+        setattr(holder, key, part)
 
 
 def shown(value: Any) -> str:

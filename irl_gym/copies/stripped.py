@@ -7,6 +7,7 @@ so that an attribute that cannot be copied is named.
 """
 
 import copy
+import random
 import types
 from collections import deque
 from typing import Any
@@ -21,6 +22,7 @@ from irl_gym.wrappers import LearnedReward
 
 SHARED = frozenset({"spec", "metadata", "_metadata", "_cached_spec", "_saved_kwargs"})
 """What describes a layer and never changes: neither copied nor part of a state."""
+GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)
 
 
 def layers(env: gym.Env) -> list[gym.Env]:

@@ -8,13 +8,14 @@ actions.
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import gymnasium as gym
 
 from irl_gym.enumeration.deep_walks import walk_on
 from irl_gym.enumeration.explored import Explored, too_large
+from irl_gym.enumeration.hidden_part import hidden_part
 from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proof, unlike
 from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
@@ -216,17 +217,20 @@ class Explorer:
         if action is not None:
             found = self.replays.state(number)
             self.trials.look(*self._steps(found), *self._steps(newcomer))
-            differ = self.trials.snapshots.differences(found, newcomer)
-            raise HiddenState(proof(self.explored, self.space, number, action, first, second, way(), differ))
+            told = proof(self.explored, self.space, number, action, first, second, way())
+            part = hidden_part(self, found, newcomer, action)
+            raise HiddenState(f"{told} {part} {part.mend(self.trials.env)}")
         return True
 
-    def behaviour(self, state: Any, reached: list[tuple[int, int, Any]], number: int | None = None) -> Behaviour | None:
+    def behaviour(
+        self, state: Any, reached: list[tuple[int, int, Any]], number: int | None = None, actions: Iterable[int] | None = None
+    ) -> Behaviour | None:
         """What an inner state does; None where that has to be counted, and no `number` says with which seeds.
 
-        The inner states that follow are added to `reached`: number, action, state.
+        The inner states that follow are added to `reached`: number, action, state. All actions are tried, or those given.
         """
         found: Behaviour = {}
-        for action in range(self.n_actions):
+        for action in range(self.n_actions) if actions is None else actions:
             row, runs = (-1, 1) if number is None else (number * self.n_actions + action, self.limits.runs)
             seen = self.trials.outcomes(self.trials.step(state, action), row, self._keep, runs=runs)
             if seen.runs and number is None:

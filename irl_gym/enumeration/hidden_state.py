@@ -11,7 +11,6 @@ Behaviour = dict[tuple[int, Any, float], float]
 """(action, successor, reward) -> probability; a successor is a state's number, an end's, or (key, terminated) of a new one."""
 SAME = 1e-9
 MOST_TOLD = 3
-MOST_DIFFERENCES = 6
 
 
 def behaviour_of_lines(lines: list[tuple[int, int, float, float]]) -> Behaviour:
@@ -32,8 +31,7 @@ def unlike(first: Behaviour, second: Behaviour) -> int | None:
 
 
 def proof(
-    explored: Explored, space: spaces.Space, number: int, action: int, first: Behaviour, second: Behaviour, way: list[int],
-    differ: list[str],
+    explored: Explored, space: spaces.Space, number: int, action: int, first: Behaviour, second: Behaviour, way: list[int]
 ) -> str:  # fmt: skip
     """The two visits in words.
 
@@ -45,15 +43,13 @@ def proof(
         first: what it does after the way on which the state was found.
         second: what it does after `way`.
         way: actions of the second visit.
-        differ: what differs inside the environment.
     """
     names: dict[int, Any] = {number: key for key, number in explored.ids.items()}
     names |= {-1 - number: key for key, number in explored.ends.items()}
     told = [_told(space, names, {place[1:]: p for place, p in one.items() if place[0] == action}) for one in (first, second)]
     return (
         f"observation {shown(space, explored.keys[number])} hides part of the state. After {_actions(explored.way(number))}, "
-        f"action {action} leads to {told[0]}; after {_actions(way)}, to {told[1]}. Inside, the environment differs in "
-        f"{'; '.join(differ[:MOST_DIFFERENCES]) or 'nothing that can be told'}."
+        f"action {action} leads to {told[0]}; after {_actions(way)}, to {told[1]}."
     )
 
 

@@ -19,8 +19,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.snapshots import GENERATORS
-from irl_gym.copies.stripped import layers
+from irl_gym.copies.stripped import GENERATORS, layers
 
 UNSEEN = "a clock, or a generator that nothing of the environment's holds"
 PYTHONS = "the module random"

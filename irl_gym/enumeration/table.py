@@ -26,11 +26,10 @@ from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.outside import OutsideRandomness
-from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter
+from irl_gym.errors import EnumerationLimit, InvalidParameter
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.mdp import AS_GOOD_AS_EXACT, TabularMDP
-from irl_gym.reveal import known_hidden
 from irl_gym.tabulation import Evidence, Lines, Samples, Tabulation, from_lines
 from irl_gym.value_error import with_errors
 
@@ -114,8 +113,6 @@ class Enumeration(Limits):
             except OutsideRandomness as error:
                 outside = error.what
                 self._forget()
-            except HiddenState as error:
-                raise HiddenState(f"{error} {_mend(env)}") from None
 
     def _run(self, explorer: Explorer, env: gym.Env, on_states: OnStates) -> None:
         written = told = time.monotonic()
@@ -173,17 +170,6 @@ def _guard(explorer: Explorer) -> None:
     names = explorer.trials.snapshots.changed_constants()
     if names:
         raise ConstantChanged(names[0])
-
-
-def _mend(env: gym.Env) -> str:
-    known = known_hidden(env)
-    how = "Reveal(env)" if known else 'Reveal(env, {"name": number of values})'
-    shown = f" ({', '.join(known)})" if known else ""
-    return (
-        f"Show what is hidden{shown} in the observation, with `irl_gym.reveal.{how}`; where it is a reward that depends on "
-        "time, replace the reward; where it is a continuous state, make cells of it with `discretize`; or count what happens "
-        "on average, with `by=Interaction()`."
-    )
 
 
 def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -> Tabulation:

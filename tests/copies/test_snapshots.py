@@ -1,5 +1,7 @@
 import collections
+import re
 import threading
+import types
 
 import gym_classics
 import gymnasium as gym
@@ -56,6 +58,11 @@ def walk(env, snapshots, actions):
     return seen
 
 
+def differences(snapshots, state):
+    """What differs between a state and the one now, in words."""
+    return [str(one) for one in snapshots.differences(state, snapshots.take())]
+
+
 def actions_of(env, seed, n=50):
     return np.random.default_rng(seed).integers(env.action_space.n, size=n).tolist()
 
@@ -98,7 +105,7 @@ def test_snapshot_holds_arrays_sets_dataclasses_and_deques():
     env.left.discard(8)
     env.bag.items.append(2)
     env.queue.append(3)
-    assert snapshots.differences(state, snapshots.take()) == [
+    assert differences(snapshots, state) == [
         "cells[1, 2]: np.float64(0.0) against np.float64(5.0)",
         "left: {8, 1} against {1}",
         "bag.items: [1] against [1, 2]",
@@ -113,7 +120,7 @@ def test_restore_removes_attributes_that_appeared_since():
     env, snapshots = snapshots_of(Walk())
     state = snapshots.take()
     env.cache = 3
-    assert snapshots.differences(state, snapshots.take()) == ["cache: absent against 3"]
+    assert differences(snapshots, state) == ["cache: absent against 3"]
     snapshots.restore(state)
     assert not hasattr(env, "cache")
 
@@ -130,14 +137,14 @@ def test_same_tells_a_shared_list_from_an_equal_one():
     env, snapshots = snapshots_of(Walk(a=[1], b=[1]))
     state = snapshots.take()
     env.b = env.a
-    assert snapshots.differences(state, snapshots.take()) == ["b: the same object as another attribute's, in one state only"]
+    assert differences(snapshots, state) == ["b: the same object as another attribute's, in one state only"]
 
 
 def test_differences_name_the_wrapper():
     env, snapshots = snapshots_of(frames())
     state = snapshots.take()
     env.step(0)
-    assert "TimeAwareObservation.timesteps: 0 against 1" in snapshots.differences(state, snapshots.take())
+    assert "TimeAwareObservation.timesteps: 0 against 1" in differences(snapshots, state)
 
 
 def test_snapshot_holds_functions_and_local_classes_by_reference():
@@ -157,7 +164,7 @@ def test_snapshot_copies_what_cannot_be_pickled():
     actions = actions_of(env, 0)
     first = walk(env, snapshots, actions)
     env.inner.n = 5
-    assert "inner.n: 0 against 5" in snapshots.differences(state, snapshots.take())
+    assert "inner.n: 0 against 5" in differences(snapshots, state)
     for _ in range(2):  # the copy is not used up
         snapshots.restore(state)
         assert env.inner.n == 0
@@ -176,10 +183,63 @@ def test_large_attributes_that_do_not_change_are_left_out_and_guarded():
 
 def test_take_notices_a_constant_bound_to_another_object():
     env, snapshots = snapshots_of(Walk(map=list(range(2000))))
-    env.map = list(range(2000))
+    env.map = list(range(1, 2001))
     with pytest.raises(ConstantChanged, match="map"):
         snapshots.take()
     assert snapshots.changed_constants() == ["map"]
+
+
+def world(**more):
+    """An attribute with a large part that never changes, and one that grows."""
+    return {"map": [[r + c for c in range(70)] for r in range(70)], "path": [], **more}
+
+
+class Grows(Walk):
+    def step(self, action):
+        path = self.world["path"] if isinstance(self.world, dict) else self.world.path
+        path.append(action)
+        return super().step(action)
+
+
+@pytest.mark.parametrize("made", [world, lambda: types.SimpleNamespace(**world())], ids=["dict", "object"])
+def test_a_large_part_of_an_attribute_is_left_out_beside_one_that_grows(made):
+    env, snapshots = snapshots_of(Grows(world=made()))
+    env.step(1)
+    state, before = snapshots.take(), str(env.world)
+    env.step(0)
+    snapshots.restore(state)
+    assert (len(state) < 500, str(env.world)) == (True, before)
+
+
+def test_a_part_of_an_attribute_that_is_changed_in_place_is_noticed_and_can_be_included():
+    env, snapshots = snapshots_of(Grows(world=world()))
+    env.world["map"][3][4] = -1
+    assert snapshots.changed_constants() == ["world['map']"]
+    snapshots.include(["world['map']"])
+    state = snapshots.take()
+    env.world["map"][3][4] = -2
+    snapshots.restore(state)
+    assert (env.world["map"][3][4], snapshots.changed_constants()) == (-1, [])
+
+
+@pytest.mark.parametrize("change", [{"map": [1]}, {"map": None}, {}], ids=["other", "none", "gone"])
+def test_take_notices_another_part_in_the_place_of_a_constant(change):
+    env, snapshots = snapshots_of(Grows(world=world()))
+    env.world = {"path": [], **change}
+    with pytest.raises(ConstantChanged, match=re.escape("world['map']")):
+        snapshots.take()
+
+
+def test_a_constant_that_is_built_anew_with_the_same_contents_stays_one_with_what_it_shares():
+    env, snapshots = snapshots_of(Grows(world=world(), row=None))
+    env.world = world()
+    env.row = env.world["map"][3]
+    state = snapshots.take()
+    env.row = env.world = None
+    snapshots.restore(state)
+    assert (len(state) < 500, env.row is env.world["map"][3], len(env.world["map"])) == (True, True, 70)
+    env.row[0] = -1
+    assert snapshots.changed_constants() == ["world['map']"]
 
 
 def test_include_puts_a_constant_into_the_state():
@@ -249,7 +309,7 @@ def test_snapshots_use_get_state_and_set_state_of_what_cannot_be_copied():
     first = walk(env, snapshots, actions)
     snapshots.restore(state)
     assert walk(env, snapshots, actions) == first
-    assert any(line.startswith("state[0]: ") for line in snapshots.differences(state, snapshots.take()))
+    assert any(line.startswith("state[0]: ") for line in differences(snapshots, state))
 
 
 class Mended(Walk):

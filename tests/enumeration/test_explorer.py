@@ -5,9 +5,10 @@ import threading
 import gymnasium as gym
 import numpy as np
 import pytest
-from enumeration_envs import Board, Corridor
+from enumeration_envs import Board, Corridor, Racetrack, same_table
 from gymnasium import spaces
 
+from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import IrlGymError, NotDiscrete, NotTabular, UnknownObservation
@@ -63,6 +64,38 @@ def test_a_large_array_that_is_changed_in_place_is_part_of_the_state(kind):
     assert table.mdp.n_states == len(closed) + len(open_) + 1
     assert table.mdp.P[[closed[n - 3] * 2 + 1]].toarray()[0, closed[n - 3]] == 1
     assert table.mdp.P[[open_[n - 3] * 2 + 1]].toarray()[0, open_[n - 2]] == 1
+
+
+@pytest.mark.parametrize("rebuilt", [False, True])
+def test_a_large_map_beside_a_growing_path_is_in_no_state(monkeypatch, rebuilt):
+    sizes = []
+    monkeypatch.setattr(Snapshots, "take", lambda self, take=Snapshots.take: sizes.append(len(take(self))) or take(self))
+    table = table_of(Racetrack(5, rebuilt=rebuilt), revisits=0)
+    assert table.evidence.exact and max(sizes) < 1000
+
+
+def test_a_map_inside_an_attribute_changes_no_table_by_being_held_constant():
+    assert same_table(table_of(Racetrack(5), revisits=0), table_of(Racetrack(5, tiles=5), revisits=0))
+
+
+class Inside(Map):
+    """The same with the map inside an attribute that changes at each step."""
+
+    def __init__(self, n=90):
+        super().__init__(n)
+        self.world = {"map": np.zeros((60, 60), dtype=np.int64), "steps": 0}
+        del self.map
+
+    map = property(lambda self: self.world["map"], lambda self, value: None, lambda self: None)
+
+    def step(self, action):
+        self.world["steps"] = 1 - self.world["steps"]
+        return super().step(action)
+
+
+def test_a_large_array_inside_an_attribute_that_is_changed_rarely_is_part_of_the_state():
+    table = tabulate(Inside(), gamma=0.9, check_steps=2000)
+    assert table.mdp.n_states == (90 - 2) + (90 - 1) + 1
 
 
 class Locked(Corridor):

@@ -86,7 +86,8 @@ class Shards:
             step = 0
             for i, length in enumerate(columns["lengths"].tolist()):
                 steps, seen = slice(step, step + length), slice(step + i, step + i + length + 1)
-                seed, ending = int(columns["seeds"][i]), str(columns["endings"][i]) if "endings" in columns else "seen"
+                seed = int(columns["seeds"][i])
+                ending: Any = str(columns["endings"][i]) if "endings" in columns else "seen"
                 yield Episode(
                     _joined(self.space, columns, seen), columns["actions"][steps], columns["rewards"][steps],
                     bool(columns["terminated"][i]), bool(columns["truncated"][i]), None if seed == NO_SEED else seed, ending,
@@ -131,7 +132,7 @@ def _columns(path: Path, space: spaces.Space) -> dict[str, np.ndarray]:
         )
     N, M = lengths.size, sum(lengths.tolist())  # Python's integers do not wrap around
     rows = {"terminated": ("b", N), "truncated": ("b", N), "seeds": ("iu", N), "actions": ("iu", M), "rewards": ("f", M)}
-    rows |= dict.fromkeys(_names(space), ("biufU", N + M))
+    rows |= dict.fromkeys(_names(space), ("biufU", N + M)) | ({"endings": ("U", N)} if "endings" in found else {})
     for name, (kinds, n) in rows.items():
         if name not in found or found[name].shape[:1] != (n,) or found[name].dtype.kind not in kinds:
             there = f"of shape {found[name].shape} and dtype {found[name].dtype}" if name in found else "not there"

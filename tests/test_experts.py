@@ -132,7 +132,7 @@ def test_a_soft_agent_refuses_a_table(unchecked):
 
 
 def test_a_soft_agent_refuses_continuous_actions():
-    with pytest.raises(NotDiscrete, match="the agent's actions are Box"):
+    with pytest.raises(NotDiscrete, match="the agent's action space is Box"):
         SoftAgent(Agent(PPO("MlpPolicy", "Pendulum-v1", device="cpu")), 1.0)
 
 
@@ -165,7 +165,7 @@ def test_an_agent_of_another_library_is_refused_unloaded(zips, tmp_path):
 def test_agents_of_continuous_actions_are_refused(tmp_path):
     PPO("MlpPolicy", "Pendulum-v1", device="cpu").save(tmp_path / "ppo")
     SAC("MlpPolicy", "Pendulum-v1", device="cpu", buffer_size=10, policy_kwargs={"net_arch": [4]}).save(tmp_path / "sac")
-    with pytest.raises(NotDiscrete, match="the agent's actions are Box"):
+    with pytest.raises(NotDiscrete, match="the agent's action space is Box"):
         load_expert(tmp_path / "ppo.zip")
     with pytest.raises(InvalidParameter, match="holds no agent of PPO, DQN, A2C"):
         load_expert(tmp_path / "sac.zip")

@@ -1,8 +1,8 @@
 """A folder is claimed for a run: what identifies the run is compared, and two files say who wrote it and where it takes place.
 
 run.json          the format, the version of irl_gym, and the command: no part of what identifies the run
-environment.json  its id, the observation space and the names of the actions: so that a run can be read where the
-                  environment is not installed
+environment.json  its id, the observation space, the names of the actions and what it was made with (large arrays by a
+                  digest): so that a run can be read where the environment is not installed
 """
 
 import importlib.metadata
@@ -83,11 +83,11 @@ def write_version(path: Path, command: Sequence[str] | None) -> None:
         )
 
 
-def write_environment(path: Path, env: gym.Env, env_id: str | None) -> None:
-    """Write environment.json, unless it stands already."""
+def write_environment(path: Path, env: gym.Env, env_id: str | None, kwargs: Any = None) -> None:
+    """Write environment.json, unless it stands already; `kwargs`, what it was made with as json, are for who reads the file."""
     if not (path / ENVIRONMENT).exists():
         observations = serialize_space(env.observation_space)  # text, as Minari keeps it: bounds may be infinite
-        told = {"id": env_id, "observations": observations, "actions": [*action_names(env)]}
+        told = {"id": env_id, "observations": observations, "actions": [*action_names(env)], "kwargs": kwargs}
         write_json(path / ENVIRONMENT, told)
 
 

@@ -24,11 +24,12 @@ from irl_gym.demonstrations import Episode, collect, collect_from_table
 from irl_gym.dynamic_programming import value_iteration
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.experiment import as_config
 from irl_gym.experts import Acting, load_expert
 from irl_gym.export import Demonstrator
 from irl_gym.given import check_agent, digest, is_file
 from irl_gym.mdp import check_discount
-from irl_gym.minari_files import spec_json
+from irl_gym.minari_files import spec_json, unkept
 from irl_gym.noise import Noisy, checked_epsilon, noisy
 from irl_gym.planners import SB3, Agent, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
@@ -142,13 +143,10 @@ class Recording:
             )
 
     def plan(self, env: gym.Env) -> dict[str, Any]:
-        """Everything that the episodes depend on, as json; a file by its digest.
-
-        Raises:
-            InvalidParameter: an environment whose spec is not json.
-        """
-        spec = spec_json(env.spec)
-        found = {**asdict(self), "environment": repr(env) if spec is None else json.loads(spec)}
+        """Everything that the episodes depend on, as json; a file by its digest, and so what json does not hold."""
+        spec = env.spec
+        told: Any = repr(env) if spec is None else as_config(spec) if unkept(spec) else json.loads(str(spec_json(spec)))
+        found = {**asdict(self), "environment": told}
         if self.expert not in NAMED:
             found["expert"] = f"file with sha256 {digest(self.expert)}"
         return found

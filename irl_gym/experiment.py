@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import math
+import pickle
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -126,7 +128,7 @@ class Experiment:
 
         Fields that came later are left out at their default: so a run of an earlier version is known again.
         """
-        told = {name: _described(getattr(self, name)) for name in self.__dataclass_fields__}
+        told = {name: as_config(getattr(self, name)) for name in self.__dataclass_fields__}
         return {name: value for name, value in told.items() if name not in LATER or value != LATER[name]}
 
 
@@ -136,23 +138,44 @@ MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""
 
 
-def _described(value: Any) -> Any:
-    """What json holds of a part of an experiment."""
+def as_config(value: Any) -> Any:
+    """What json holds of a part of an experiment: of a large array, or an object without a text of its own, a digest."""
     if is_dataclass(value) and not isinstance(value, type):
         return {
             "type": type(value).__name__,
-            **{one.name: _described(getattr(value, one.name)) for one in fields(value) if one.init},
+            **{one.name: as_config(getattr(value, one.name)) for one in fields(value) if one.init},
         }
     if isinstance(value, Mapping):
-        return {str(key): _described(one) for key, one in value.items()}
+        return {str(key): as_config(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_described(one) for one in value]
-    if isinstance(value, np.ndarray) and value.size > MOST_LISTED:
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return {"array": list(value.shape), "sha256": digest}
+        return [as_config(one) for one in value]
+    if isinstance(value, set | frozenset):
+        return [as_config(one) for one in sorted(value, key=repr)]
+    if isinstance(value, np.ndarray):
+        if value.size <= MOST_LISTED:
+            return as_config(value.tolist())
+        content = None if value.dtype.hasobject else np.ascontiguousarray(value).tobytes()
+        return {"array": list(value.shape), "sha256": _digest(value.tolist()) if content is None else _sha256(content)}
     if callable(value):
         return getattr(value, "__qualname__", type(value).__name__)
-    return json.loads(json.dumps(value, default=plain_json))
+    plain = json.loads(json.dumps(value, default=plain_json))
+    if isinstance(plain, float) and not math.isfinite(plain):
+        return {"float": str(plain)}
+    if isinstance(plain, str) and not isinstance(value, str) and " at 0x" in plain:  # where it is in memory
+        return {"object": f"{type(value).__module__}.{type(value).__qualname__}", "sha256": _digest(value)}
+    return plain
+
+
+def _digest(value: Any) -> str | None:
+    """Of an object's pickle; None where it refuses to be pickled."""
+    try:
+        return _sha256(pickle.dumps(value, protocol=4))
+    except Exception:  # whatever its class raises
+        return None
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:

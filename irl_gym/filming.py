@@ -17,6 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from PIL import Image, features
 
+from irl_gym.closing import close
 from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.errors import UnknownObservation
 from irl_gym.features import batch_of_one, take
@@ -73,7 +74,7 @@ def film(loop: "Loop", name: str) -> Film:
             choose = _chooser(loop, loop.expert if name == "expert" else loop.agent, seed)
             made = _run(env, choose, seed, min(step_limit(loop.env), MOST_STEPS), without)
     finally:
-        env.close()
+        close(env)
     return _developed(loop, name, seed, made)
 
 

@@ -35,7 +35,7 @@ from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
 from irl_gym.endings import in_table, left_out
 from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
-from irl_gym.experiment import Experiment
+from irl_gym.experiment import Experiment, as_config
 from irl_gym.given import FromFile
 from irl_gym.glances import Glances
 from irl_gym.learners.base import IRLResult, Learner
@@ -44,6 +44,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.logs import log_scalars, logged
+from irl_gym.minari_files import unkept
 from irl_gym.places import place_of
 from irl_gym.planners import SB3, Agent, Planner
 from irl_gym.policies import Policy
@@ -100,7 +101,7 @@ class Loop:
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(path, config)
         write_version(path, command)
-        write_environment(path, self.env, self.env_id)
+        write_environment(path, self.env, self.env_id, None if self.env.spec is None else as_config(self.env.spec.kwargs))
         if isinstance(self.world, TableWorld):
             keep_table(self.world.table, path)
         self.report_progress("table", 1.0)
@@ -213,9 +214,12 @@ class Loop:
         dataset_id = dataset_name(str(asked.env_id))
         root = folder / "dataset"
         root.mkdir()
+        lost = unkept(self.env.spec)
+        about = f"Expert demonstrations of {asked.env_id}, gamma {asked.gamma}, seed {asked.seed}."
         write_minari(
-            recorded, dataset_id, self.env, root=root, algorithm=self.stage("expert")["planner"],
-            description=f"Expert demonstrations of {asked.env_id}, gamma {asked.gamma}, seed {asked.seed}.",
+            recorded, dataset_id, None if lost else self.env, root=root, algorithm=self.stage("expert")["planner"],
+            observation_space=self.env.observation_space, action_space=self.env.action_space,
+            description=f"{about} {lost}" if lost else about,
             code_permalink="scripts/recover_and_retrain.py of irl_gym",
             random_return=float(np.mean([episode.total_reward for episode in chance])),
             expert_return=float(np.mean([episode.total_reward for episode in recorded])),
@@ -225,6 +229,7 @@ class Loop:
             "episodes": len(recorded),
             "environment_steps": sum(map(len, recorded)),
             "seed": asked.seed,
+            **({"no_environment": lost} if lost else {}),
         }
 
     def _make_reward(self, folder: Path) -> dict[str, Any]:

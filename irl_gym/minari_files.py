@@ -23,6 +23,7 @@ from minari.serialization import serialize_space
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetExists, InvalidDemonstrations, InvalidParameter
 from irl_gym.minari_formats import WRITERS, DataFormat
+from irl_gym.rewards import plain_json
 from irl_gym.watching import WATCHING
 
 _NAMESPACE = "namespace_metadata.json"
@@ -93,6 +94,16 @@ def spec_json(spec: EnvSpec | None) -> str | None:
         ) from error
 
 
+def unkept(spec: EnvSpec | None) -> str | None:
+    """Why a dataset cannot say where it was recorded, in a sentence; None where it can."""
+    try:
+        spec_json(spec)
+    except InvalidParameter as error:
+        name = "" if spec is None else spec.id
+        return f"The dataset does not say that it was recorded in {name}: the spec is no json ({error.__cause__})."
+    return None
+
+
 def identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
     """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
     if spec is None:
@@ -116,7 +127,7 @@ def told(spec: EnvSpec | None) -> str:
 
 def _plain(value: Any) -> Any:
     """As json gives it back: lists for tuples."""
-    return json.loads(json.dumps(value, default=repr))
+    return json.loads(json.dumps(value, default=plain_json))
 
 
 def check_id(dataset_id: str) -> None:

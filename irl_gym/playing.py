@@ -24,7 +24,7 @@ from irl_gym.datasets import writable_root, write_minari
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidParameter
 from irl_gym.keyboard import AGAIN, HELP, QUIT, Controls, controls_of, described
-from irl_gym.minari_files import check_free, check_id
+from irl_gym.minari_files import check_free, check_id, unkept
 from irl_gym.reveal import Reveal, known_hidden
 from irl_gym.tabulate import make
 
@@ -227,7 +227,7 @@ def free_dataset(dataset_id: str | None, env: gym.Env, root: str | None) -> str:
 
 def _rehearse(env: gym.Env, dataset_id: str) -> None:
     """Write an episode of one step where nobody sees it: what Minari cannot keep is found out before it is played."""
-    description_of(dataset_id, env, None, None, "hdf5", {})
+    description_of(dataset_id, _told(env), env.observation_space, env.action_space, "hdf5", {})
     game = Play(env, controls_of(env), 1, keep_unfinished=True)
     try:
         game.start()
@@ -239,7 +239,7 @@ def _rehearse(env: gym.Env, dataset_id: str) -> None:
             "`observation_space`, or what `reset` and `step` return."
         ) from error
     with tempfile.TemporaryDirectory() as folder:
-        write_minari(game.episodes, "rehearsal-v0", env, root=folder, algorithm=PLAYER)
+        _write(game.episodes, "rehearsal-v0", env, folder)
 
 
 def write_played(play: Play, dataset_id: str, env: gym.Env, root: str | None) -> minari.MinariDataset:
@@ -251,10 +251,24 @@ def write_played(play: Play, dataset_id: str, env: gym.Env, root: str | None) ->
         env: as a dataset records it, from `stage`.
         root: Minari's root folder; None for the one in force.
     """
-    return write_minari(play.episodes, dataset_id, env, root=root, algorithm=PLAYER, description="Played with irl_gym.")
+    return _write(play.episodes, dataset_id, env, root)
 
 
-def learn_command(dataset_id: str, root: str | None) -> str:
-    """The command that learns from a dataset."""
-    where = ("--dataset-root", root) if root is not None else ()
+def _write(episodes: list[Episode], dataset_id: str, env: gym.Env, root: str | None) -> minari.MinariDataset:
+    about = " ".join(filter(None, ("Played with irl_gym.", unkept(env.spec))))
+    return write_minari(
+        episodes, dataset_id, _told(env), root=root, algorithm=PLAYER, description=about,
+        observation_space=env.observation_space, action_space=env.action_space,
+    )  # fmt: skip
+
+
+def _told(env: gym.Env) -> gym.Env | None:
+    """The environment, where a dataset can say that it was recorded there."""
+    return None if unkept(env.spec) else env
+
+
+def learn_command(dataset_id: str, root: str | None, env_id: str | None = None) -> str:
+    """The command that learns from a dataset; it names the environment where the dataset does not."""
+    where = () if env_id is None else ("--env-id", env_id)
+    where += ("--dataset-root", root) if root is not None else ()
     return shlex.join(["python", "scripts/recover_and_retrain.py", "--dataset", dataset_id, *where])

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from irl_gym.checks import checked_number
+from irl_gym.closing import close
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidParameter
 from irl_gym.features import by_part, take
@@ -78,7 +79,7 @@ def _batches(env: gym.Env, policy: Policy, n: int, seed: int, most: int | None, 
         for begin in range(0, n, copies):
             yield from _batch(vector, policy, np.arange(begin, min(begin + copies, n)), seed + begin, most, deterministic)
     finally:
-        vector.close()
+        close(vector)
 
 
 def _batch(
@@ -114,7 +115,7 @@ def _vector(env: gym.Env, copies: int) -> VectorEnv:
         made = gym.make_vec(spec, num_envs=copies, vectorization_mode="vector_entry_point", **_quiet(env))
         if made.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) == AutoresetMode.NEXT_STEP:
             return made
-        made.close()
+        close(made)
     return SyncVectorEnv([maker_of(env)] * copies)
 
 

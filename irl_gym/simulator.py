@@ -15,6 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 
 from irl_gym.checks import checked_number, discrete_actions
+from irl_gym.closing import close
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.features import FeatureMap, batch_size, checked_features, over_rows
 from irl_gym.linear_reward import LinearReward
@@ -106,7 +107,7 @@ class Simulator:
         try:
             return self.planner.plan(world, gamma=self.gamma, seed=seed)
         finally:
-            world.close()
+            close(world)
 
     @property
     def limit(self) -> int | None:

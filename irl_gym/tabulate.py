@@ -19,6 +19,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from irl_gym.blackjack import blackjack_table
 from irl_gym.checks import checked_number, discrete_actions
+from irl_gym.closing import close
 from irl_gym.copies.calls import seeded_globals
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotTabular, UnknownEnvironment
@@ -168,7 +169,7 @@ def _check_flags(env: gym.Env, kwargs: dict[str, Any]) -> None:
     known = inspect.signature(type(env.unwrapped).__init__).parameters
     for name, value in kwargs.items():
         if isinstance(value, str) and name in known and isinstance(known[name].default, bool):
-            env.close()
+            close(env)
             raise InvalidParameter(f"{name} is {value!r}: expected true or false, as its default {known[name].default}.")
 
 

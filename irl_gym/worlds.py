@@ -16,6 +16,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym import metrics
+from irl_gym.closing import close
 from irl_gym.demonstrations import Episode, collect, collect_from_table
 from irl_gym.errors import InvalidParameter
 from irl_gym.linear_reward import LinearReward
@@ -184,7 +185,7 @@ class SteppedWorld:
         try:
             return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
         finally:
-            env.close()
+            close(env)
 
     def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
         """Write an agent in SB3's zip, its algorithm and its noise as json."""

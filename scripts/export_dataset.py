@@ -23,6 +23,7 @@ from irl_gym.datasets import described
 from irl_gym.demonstrators import Recording
 from irl_gym.experiment import parse_keywords
 from irl_gym.export import Amount, export_dataset
+from irl_gym.minari_files import unkept
 from irl_gym.terminal import OPTIONS, UNSET, print_error, stage_bars
 
 
@@ -78,7 +79,12 @@ def main(arguments: Arguments) -> int:
         keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
         env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
         metadata = {**recording.metadata(arguments.env_id), "code_permalink": "scripts/export_dataset.py of irl_gym"}
-        about = described(arguments.dataset_id, env, None, None, arguments.format, metadata)
+        lost = unkept(env.spec)
+        if lost:
+            metadata["description"] += f" {lost}"
+        about = described(
+            arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
+        )
         with stage_bars(console) as show:
             dataset = export_dataset(
                 lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
@@ -95,6 +101,8 @@ def main(arguments: Arguments) -> int:
         f"{dataset.id}: {dataset.total_episodes:,} episodes, {dataset.total_steps:,} steps, {size:,.1f} MB, at", end=" "
     )
     console.print(Text(str(Path(dataset.storage.data_path).parent)))
+    if lost:
+        console.print(Text(f"{lost} Who learns from it names one with --env-id."))
     return 0
 
 

@@ -22,6 +22,7 @@ import tyro
 from irl_gym import IrlGymError
 from irl_gym.experiment import parse_keywords
 from irl_gym.keyboard import controls_of
+from irl_gym.minari_files import unkept
 from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
 from irl_gym.screens import as_text, draw, terminal_keys, window_keys
 from irl_gym.terminal import OPTIONS, UNSET, print_error
@@ -111,7 +112,7 @@ def main(asked: Arguments) -> int:
         return code or 1
     returns = ", ".join(f"{episode.total_reward:g}" for episode in play.episodes)
     print(f"Dataset {dataset_id} is written. Episodes: {len(play.episodes)}. Returns: {returns}. Learn from it with")
-    print(f"    {learn_command(dataset_id, asked.root)}")
+    print(f"    {learn_command(dataset_id, asked.root, asked.env_id if unkept(plain.spec) else None)}")
     return code
 
 

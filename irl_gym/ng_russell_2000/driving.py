@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl_gym.closing import close
 from irl_gym.errors import InvalidParameter
 from irl_gym.policies import Policy
 
@@ -53,5 +54,5 @@ def drive(env: gym.Env, policy: Policy, *, within: tuple[float, float], n: int, 
         here &= ~terminated
         if step in judged:
             parked += (observations[:, 0] >= within[0]) & (observations[:, 0] <= within[1])
-    vector.close()
+    close(vector)
     return Drive(float(value.mean()), float(1 - here.mean()), float(parked[here].mean() / len(judged)) if here.any() else 0.0)

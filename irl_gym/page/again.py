@@ -103,6 +103,8 @@ def _absent(key: str, value: Any) -> str | None:
     """What an entry stands for and does not hold; None where it holds all."""
     if isinstance(value, Mapping) and set(value) == {"array", "sha256"}:
         return f"an array of {' x '.join(f'{n:,}' for n in value['array'])} numbers"
+    if isinstance(value, Mapping) and set(value) == {"object", "sha256"}:
+        return f"a {value['object']}"
     if key in CALLED and isinstance(value, str):
         return f"which is {value}"
     return f"a {value['type']}" if is_part(key, value) and value["type"] not in KINDS else None
@@ -121,6 +123,8 @@ def _python(key: str, value: Any, used: set[str]) -> str:
             if name != "type" and one != own.get(name, MISSING)
         )
         return f"{value['type']}({', '.join(told)})"
+    if isinstance(value, Mapping) and value.get("float") in ("inf", "-inf", "nan"):
+        return f"float({value['float']!r})"
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{name!r}: {_python('', one, used)}" for name, one in value.items()) + "}"
     if isinstance(value, list):

@@ -22,6 +22,8 @@ def asked(run: Run) -> Section:
     else:
         changed = [("environment", str(run.env_id or run.config.get("dataset"))), *typed(command)]
         lead = "Listed is what the command asked for; everything else, most of it by default, is below."
+    lost = run.stages.get("demonstrations", {}).get("no_environment")
+    changed += [("demonstrations", str(lost))] if lost else []
     whole = json.dumps(dict(run.config), indent=1, sort_keys=True)
     return Section("asked", "What was asked", lead, (), "asked", {"lines": changed, "raw": whole})
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import cvxpy as cp
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
 SolverName = Literal["auto", "clarabel", "highs"]
@@ -95,7 +95,7 @@ def check_solving(solver: Any, time_limit: Any) -> None:
     Raises:
         InvalidParameter: an unknown solver name, or a time limit that is not positive.
     """
-    if solver not in ("auto", *_SOLVERS):
+    if not is_word(solver, "auto", *_SOLVERS):
         raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
     if time_limit is not None:
         checked_number("time_limit", time_limit, "seconds above 0, or None", above=0)

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import struct
+import tokenize
 import warnings
 import zipfile
 import zlib
@@ -38,7 +39,7 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 """Readers of NumPy's headers by their version; a third is for the names of records, which are not read."""
 _BROKEN = (
     ValueError, KeyError, EOFError, TypeError, IndexError, RuntimeError, AttributeError, ArithmeticError, MemoryError,
-    struct.error, zipfile.BadZipFile, zlib.error,
+    SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 """What zipfile and NumPy's reader of headers raise of other bytes than they expect."""
 

@@ -8,13 +8,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement, product
+from math import comb, prod
 from typing import Any
 
 import numpy as np
 
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import any_array, checked_number, float_array
 from irl_gym.errors import InvalidFeatures
 from irl_gym.features import ALL
+
+MOST = 1_000_000
+"""Features K at most: each is a row of exponents, held in memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +68,13 @@ class RadialBasis:
             coordinates: as the field.
         """
         low_, high_ = _bounds(low, high)
-        given = np.asarray(counts)
+        given = any_array("counts", counts, "whole numbers", InvalidFeatures)
         if given.dtype.kind not in "iu" or given.shape not in ((), low_.shape) or (given < 1).any():
             raise InvalidFeatures(
                 f"counts is {counts!r}: expected at least one centre along each coordinate, one whole number or {low_.size}."
             )
         each = np.broadcast_to(given, low_.shape)
+        _check_count(prod(each.tolist()))
         width = checked_number("width", width, "a number of spacings above 0", above=0, error=InvalidFeatures)
         axes = [np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2]) for a, b, n in zip(low_, high_, each, strict=True)]
         spacing = (high_ - low_) / np.maximum(each - 1, 1)
@@ -116,8 +121,9 @@ class Fourier:
     """Makes (N, d) coordinates of observations; None takes them as they are, flattened."""
 
     def __post_init__(self) -> None:
-        _bounds(self.low, self.high)
+        low, _ = _bounds(self.low, self.high)
         _order(self.order)
+        _check_count((int(self.order) + 1) ** min(low.size, 20))  # 2^20 are too many already
 
     @cached_property
     def frequencies(self) -> np.ndarray:
@@ -161,8 +167,9 @@ class Polynomial:
     """Makes (N, d) coordinates of observations; None takes them as they are, flattened."""
 
     def __post_init__(self) -> None:
-        _bounds(self.low, self.high)
+        low, _ = _bounds(self.low, self.high)
         _order(self.degree)
+        _check_count(comb(low.size + int(self.degree), min(low.size, int(self.degree), 20)))  # of (40 over 20), too
 
     @cached_property
     def exponents(self) -> np.ndarray:
@@ -217,6 +224,13 @@ def _span(low: Any, high: Any) -> str:
 
 def _order(order: Any) -> None:
     checked_number("the order", order, "a whole number of at least 0", least=0, whole=True, error=InvalidFeatures)
+
+
+def _check_count(count: int) -> None:
+    if count > MOST:
+        raise InvalidFeatures(
+            f"there are more than {MOST:,} features: expected at most as many. Lower the order, or choose fewer coordinates."
+        )
 
 
 def _exponents(order: int, d: int) -> np.ndarray:

@@ -50,6 +50,23 @@ def checked_number(
     return number
 
 
+def is_word(value: Any, *words: str) -> bool:
+    """Is this one of some words? Arrays, which compare with text one by one, are none."""
+    return isinstance(value, str) and value in words
+
+
+def any_array(name: str, value: Any, expected: str, error: type[InvalidInput]) -> np.ndarray:
+    """Return an array-like as an array of any type.
+
+    Raises:
+        InvalidInput: of the class given, for rows of several lengths.
+    """
+    try:
+        return np.asarray(value)
+    except (ValueError, OverflowError) as reason:
+        raise error(f"{name} is rows of several lengths, or none at all ({reason}): expected {expected}.") from reason
+
+
 def checked_rng(rng: Any) -> np.random.Generator:
     """Return a generator as it is.
 

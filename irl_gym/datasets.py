@@ -155,7 +155,7 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
         DatasetMissing: no dataset of that id under the root; those that are there are named.
         InvalidDemonstrations: a dataset that Minari cannot read.
     """
-    if root is not None and not Path(root).is_dir():
+    if root is not None and not (isinstance(root, str | os.PathLike) and Path(root).is_dir()):
         raise DatasetMissing(f"{root} is no folder: expected Minari's root, under which {dataset_id!r} is. Name another.")
     with minari_root(root) as base:
         check_id(dataset_id)

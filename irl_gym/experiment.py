@@ -81,6 +81,9 @@ class Experiment:
 
     def __post_init__(self) -> None:
         check_discount(self.gamma)
+        for name in ("env_id", "dataset"):
+            if not isinstance(getattr(self, name), str | None):
+                raise InvalidParameter(f"{name} is {getattr(self, name)!r:.80}: expected a text, or None.")
         if (self.env_id or self.dataset) is None:
             raise InvalidParameter(
                 "env_id and dataset are None: expected an environment, or a dataset that was recorded in one."
@@ -187,8 +190,8 @@ def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
     if len(parts) == 1 and parts[0].lstrip().startswith("{"):
         try:
             return json.loads(parts[0])
-        except json.JSONDecodeError as error:
-            raise InvalidParameter(f"env-kwargs is {parts[0]!r}, not json ({error}): expected an object.") from error
+        except (ValueError, RecursionError) as error:
+            raise InvalidParameter(f"env-kwargs is {parts[0]!r:.200}, not json ({error}): expected an object.") from error
     found: dict[str, Any] = {}
     for part in parts:
         name, equals, text = part.partition("=")
@@ -196,6 +199,8 @@ def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
             raise InvalidParameter(f"env-kwargs has {part!r}: expected name=value, such as map_name=8x8.")
         try:
             found[name] = json.loads(text)
-        except json.JSONDecodeError:
+        except ValueError:
             found[name] = text
+        except RecursionError as error:
+            raise InvalidParameter(f"env-kwargs has {part!r:.40}, nested too deeply: expected plain json, or text.") from error
     return found

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.checks import any_array
 from irl_gym.errors import InvalidMDP, UnknownObservation
 from irl_gym.integer_spaces import ranges
 from irl_gym.states import Numbering
@@ -34,7 +35,7 @@ class ListedStates(Numbering):
     """Row of a state -> row of its terminal copy, for states entered both with and without `terminated`; copies come last."""
 
     def __post_init__(self) -> None:
-        numbers = np.asarray(self.numbers)
+        numbers = any_array("numbers", self.numbers, "(n, k) integers", InvalidMDP)
         if numbers.ndim != 2 or not numbers.size or numbers.dtype.kind not in "iub":
             raise InvalidMDP(
                 f"numbers have shape {numbers.shape} and dtype {numbers.dtype}: expected (n, k) integers, n at least 1."

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import breadth_first_order
 
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
-from irl_gym.checks import checked_number, float_array, sparse_copy
+from irl_gym.checks import any_array, checked_number, float_array, sparse_copy
 from irl_gym.errors import InvalidDiscount, InvalidMDP
 from irl_gym.policies import as_distribution, policy_array
 
@@ -234,10 +234,7 @@ def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
 
 
 def _checked_visits(visits: Any, shape: tuple[int, int]) -> np.ndarray:
-    try:
-        array = np.array(visits)
-    except ValueError as error:
-        raise InvalidMDP(f"visits are rows of several lengths: expected {shape} whole numbers.") from error
+    array = any_array("visits", visits, f"{shape} whole numbers", InvalidMDP)
     if array.shape != shape or array.dtype.kind not in "iu" or (array < 0).any():
         raise InvalidMDP(
             f"visits has shape {array.shape} and dtype {array.dtype}: expected {shape} whole numbers of at least 0, the steps "

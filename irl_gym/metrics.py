@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix, Vector
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.dynamic_programming import evaluate_policy, occupancy, optimum, policy_iteration
 from irl_gym.errors import InvalidParameter
 from irl_gym.howard import OUTWARDS, Optimum
@@ -274,7 +274,7 @@ def occupancy_distance(
     Raises:
         InvalidParameter: `on` is neither.
     """
-    if on not in ("state", "state-action"):
+    if not is_word(on, "state", "state-action"):
         raise InvalidParameter(f"on is {on!r}: expected 'state' or 'state-action'.")
     visits = [occupancy(checked_mdp(mdp), policy) for policy in (first, second)]
     if on == "state":

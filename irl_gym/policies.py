@@ -15,7 +15,7 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
 from irl_gym.archives import read_arrays
-from irl_gym.checks import checked_number
+from irl_gym.checks import any_array, checked_number
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
 from irl_gym.states import States
 
@@ -76,10 +76,7 @@ def policy_array(policy: Any) -> np.ndarray:
     """
     if isinstance(policy, TabularPolicy):
         return policy.probabilities
-    try:
-        return np.asarray(policy)
-    except ValueError as error:
-        raise InvalidPolicy(f"policy cannot be read as an array ({error}): expected one entry for each state.") from error
+    return any_array("policy", policy, "one entry for each state", InvalidPolicy)
 
 
 def _one_hot(actions: np.ndarray, n_actions: int) -> np.ndarray:

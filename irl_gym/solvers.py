@@ -17,6 +17,7 @@ from typing import Any, Literal
 import cvxpy as cp
 import numpy as np
 
+from irl_gym.checks import is_word
 from irl_gym.deadline import NEVER, Deadline
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 
@@ -114,7 +115,7 @@ class Solving:
         Raises:
             InvalidParameter: an unknown solver name, or a time limit that is not positive.
         """
-        if solver not in ("auto", *_SOLVERS):
+        if not is_word(solver, "auto", *_SOLVERS):
             raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
         return cls(solver, Deadline.after(time_limit))
 

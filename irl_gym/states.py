@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.checks import any_array
 from irl_gym.errors import InvalidMDP, InvalidParameter, NotDiscrete, UnknownObservation
 from irl_gym.integer_spaces import as_batch, checked_members, first_of, from_numbers, is_batch, ranges, to_numbers
 
@@ -160,7 +161,8 @@ class Numbering:
         return from_numbers(self.space, self.numbers_of(rows))
 
     def _checked_rows(self, rows: Any) -> np.ndarray:
-        found = np.asarray(rows) if np.size(rows) else np.zeros(np.shape(rows), dtype=np.int64)
+        found = any_array("rows", rows, "(N,) integers", InvalidParameter)
+        found = found if found.size else found.astype(np.int64)
         if found.ndim != 1 or found.dtype.kind not in "iu":
             raise InvalidParameter(f"rows have shape {found.shape} and dtype {found.dtype}: expected (N,) integers.")
         wrong = np.flatnonzero((found < 0) | (found >= self.n_states))
@@ -174,7 +176,7 @@ class Numbering:
         Raises:
             InvalidParameter: no row of the table.
         """
-        return first_of(self.space, self.decode_batch(np.array([row])))
+        return first_of(self.space, self.decode_batch(any_array("row", [row], "an integer", InvalidParameter)))
 
 
 @dataclass(frozen=True, eq=False)

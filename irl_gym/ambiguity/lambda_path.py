@@ -169,7 +169,35 @@ class LambdaPath:
             raise InvalidReward(f"{path} has no {missing[0]}: expected a file written by LambdaPath.save.")
         numbers = {name: header[name] for name in NUMBERS if name != "exact"}  # a property; before it was the search's own word
         numbers |= {"whole": header.get("whole", header["exact"]), "violation": header.get("violation", np.nan)}
+        _check(path, arrays, numbers)
         return cls(**{name: arrays[name] for name in ARRAYS}, **numbers)
+
+
+def _check(path: str | os.PathLike, arrays: dict[str, np.ndarray], numbers: dict[str, Any]) -> None:
+    """Check that what a file holds is a path: k pieces, one after the other.
+
+    Raises:
+        InvalidReward: naming what is not.
+    """
+    k, R = arrays["l1_norms"].size, arrays["rewards"].shape[1:]
+    shapes = {"breakpoints": (k + 1,), "gaps": (k + 1,), "l1_norms": (k,), "total_margins": (k,), "rewards": (k, *R)}
+    shapes |= {"margins": (k, *R[:1])}
+    for name, shape in shapes.items():
+        one = arrays[name]
+        if one.shape != shape or one.dtype.kind != "f" or not one.size or len(R) not in (1, 2):
+            raise InvalidReward(f"{path} has {name} of shape {one.shape} and dtype {one.dtype}: expected {shape} floats.")
+        fine = ~np.isinf(one) if name == "margins" else np.isfinite(one)
+        if not fine.all():
+            raise InvalidReward(f"{path} has {one[~fine][0]} among its {name}: expected finite numbers.")
+    if (np.diff(arrays["breakpoints"]) < 0).any() or arrays["breakpoints"][0] < 0:
+        raise InvalidReward(f"{path} has breakpoints {arrays['breakpoints'][:9]}: expected them from 0 on, increasing.")
+    for name, value in numbers.items():
+        if name == "whole":
+            if not isinstance(value, bool):
+                raise InvalidReward(f"{path} has {name} {value!r:.80}: expected true or false.")
+        elif not (name == "margin_cap" and value is None) and not (name == "violation" and value != value):
+            least = None if name == "gap" else 0
+            checked_number(f"{name} of {path}", value, "a finite number", least=least, error=InvalidReward)
 
 
 def lambda_path(

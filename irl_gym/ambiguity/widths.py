@@ -26,7 +26,7 @@ import numpy as np
 from irl_gym._typing import ActionSets, Indices
 from irl_gym.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.ambiguity.reward_sets import RewardSet, StateRewards, StepRewards
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.deadline import Deadline
 from irl_gym.errors import InvalidParameter, SolverInfeasible
 from irl_gym.learners.finite import FiniteLP
@@ -120,7 +120,7 @@ def feasible_widths(
         SolverTimeout, SolverFailed: no answer.
     """
     learner = FiniteLP(r_max=r_max, reward_on=reward_on, unvisited="free", time_limit=time_limit)  # checks these
-    if margin is not None and margin != "auto":
+    if margin is not None and not is_word(margin, "auto"):
         margin = checked_number("margin", margin, "a number of at least 0, 'auto' or None", least=0)
     posed = pose(mdp, expert)
     kind: type[RewardSet] = StateRewards if reward_on == "state" else StepRewards

@@ -34,9 +34,9 @@ def left_behind(path: Path) -> Case | None:
         record = _maybe(path / RECORDS / "reward.json")
         learned = load_reward(path / "reward.npz") if record else None
         expert = _expert(path, config, table)
+        claims = _maybe(path / "certificate.json") if record else {}
     except (OSError, *SURPRISES, IrlGymError):
         return None
-    claims = _maybe(path / "certificate.json") if record else {}
     reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
     if reward is not None and not isinstance(reward, TabularReward):
         return None

@@ -11,11 +11,13 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.checks import checked_number
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.features import by_part
 from irl_gym.imports.reading import Last, reading
 from irl_gym.imports.rows import Rows, say_dropped
+from irl_gym.imports.values import as_array, is_list, truths
 
 
 def from_rollouts(
@@ -62,20 +64,26 @@ def from_rollouts(
     order = _order(buffer)
     if not len(order):
         raise InvalidDemonstrations("there are no rows: the buffer is empty. Let the algorithm collect some steps first.")
-    size, copies = int(buffer.buffer_size), np.asarray(buffer.rewards).shape[1]
+    rewards, size = as_array(buffer.rewards, "rewards"), int(buffer.buffer_size)
+    if rewards.ndim != 2:
+        raise InvalidDemonstrations(f"the buffer's rewards have shape {rewards.shape}: expected (n_steps, n_envs).")
+    copies = rewards.shape[1]
     copy, time = np.divmod(np.arange(copies * len(order)), len(order))  # copy after copy, each in the order of time
 
     def column(raw: Any) -> Any:
-        return by_part(lambda part: _by_time(np.asarray(part), size, copies)[order[time], copy], raw)
+        return by_part(lambda part: _by_time(as_array(part, "buffer's arrays"), size, copies)[order[time], copy], raw)
+
+    def flag(what: str, raw: Any) -> np.ndarray:
+        return truths(column(raw) if is_list(raw) else raw, what, lambda row: f"copy {copy[row]}, step {time[row]} (from 0)")
 
     flags: dict[str, np.ndarray] = {}
     if replay:
-        done = column(buffer.dones) != 0
-        timeouts = column(getattr(buffer, "timeouts", np.zeros_like(buffer.dones))) != 0
+        done = flag("dones", buffer.dones)
+        timeouts = flag("timeouts", getattr(buffer, "timeouts", np.zeros(rewards.shape)))
         flags = {"terminated": done & ~timeouts, "truncated": done & timeouts}
         starts = np.append(True, done[:-1])
     else:
-        starts = column(buffer.episode_starts) != 0
+        starts = flag("episode_starts", buffer.episode_starts)
     starts |= time == 0
     following = getattr(buffer, "next_observations", None)
     rows = _worth_reading(starts, keep_single=following is not None or last in ("keep", "repeat"))
@@ -102,8 +110,16 @@ def _worth_reading(starts: np.ndarray, keep_single: bool) -> np.ndarray:
 
 def _order(buffer: Any) -> np.ndarray:
     """(T,) the steps that are filled, the oldest first: a full replay buffer is a ring."""
-    size, at = int(buffer.buffer_size), int(buffer.pos)
-    if not getattr(buffer, "full", False):
+    size, at, full = buffer.buffer_size, buffer.pos, getattr(buffer, "full", False)
+    checked_number("the buffer's size", size, "a whole number of at least 1", least=1, whole=True, error=InvalidDemonstrations)
+    rows = len(buffer.rewards) if is_list(buffer.rewards) else 0  # `get` has flattened them
+    checked_number(
+        "the buffer's place", at, f"a whole number from 0 to {size}", least=0, below=min(size, rows) + 1, whole=True,
+        error=InvalidDemonstrations,
+    )  # fmt: skip
+    if not isinstance(full, bool | np.bool) or (full and rows < size):
+        raise InvalidDemonstrations(f"the buffer is full: {full!r:.80}, with {rows} rows: expected true or false, and {size}.")
+    if not full:
         return np.arange(at)
     order = (np.arange(size) + at) % size
     return order[1:] if getattr(buffer, "optimize_memory_usage", False) else order  # the newest step has overwritten the oldest

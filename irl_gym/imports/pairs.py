@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.checks import is_word
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.imports.reading import Last, Reading, reading
@@ -57,10 +58,10 @@ def from_pairs(
         NotDiscrete: continuous actions.
     """
     how = reading(space, n_actions, action_space, env, last)
-    if not isinstance(pairs, Iterable):
+    if not isinstance(pairs, Iterable) or (isinstance(pairs, np.ndarray) and not pairs.ndim):
         raise InvalidDemonstrations(f"the pairs are {type(pairs).__name__}: expected something to iterate over.")
     names = list(fields) if isinstance(fields, Sequence) else []
-    known = all(one in FIELDS and names.count(one) == 1 for one in names)
+    known = all(is_word(one, *FIELDS) and names.count(one) == 1 for one in names)
     if fields is not None and not (known and set(FIELDS[:2]) <= set(names)):
         raise InvalidParameter(f"fields are {fields!r}: expected observation, action and others of {FIELDS}, once each.")
     return _counted(_episodes(pairs, tuple(names), how))

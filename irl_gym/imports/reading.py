@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import gymnasium as gym
 from gymnasium import spaces
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import InvalidParameter, NotDiscrete
 
 Last = Literal["keep", "drop", "repeat", "row"]
@@ -37,7 +37,7 @@ class Reading:
     """What the source calls an episode."""
 
     def __post_init__(self) -> None:
-        if self.last not in get_args(Last):
+        if not is_word(self.last, *get_args(Last)):
             raise InvalidParameter(
                 f"last is {self.last!r}: expected 'keep', 'drop', 'repeat' or 'row', what to do where an episode's last "
                 "observation is missing."

@@ -49,7 +49,7 @@ def from_imitation(
     """
     how = reading(space, n_actions, action_space, env, noun="trajectory")
     every = [trajectories] if hasattr(trajectories, "acts") or isinstance(trajectories, Mapping) else trajectories
-    if not isinstance(every, Iterable):
+    if not isinstance(every, Iterable) or (isinstance(every, np.ndarray) and not every.ndim):
         raise InvalidDemonstrations(f"the trajectories are {type(every).__name__}: expected a list of them.")
     every = list(every)
     if not every:
@@ -87,7 +87,7 @@ def _field(trajectory: Any, key: str, number: int) -> Any:
 def _flag(value: Any, number: int) -> bool:
     if value is None:
         return False
-    if as_array(value, "terminal flags").ndim or value not in (True, False):
+    if not isinstance(value, bool | np.bool | int | np.ndarray) or as_array(value, "flags").ndim or value not in (True, False):
         raise InvalidDemonstrations(f"trajectory {number} (from 0) has terminal {value!r}: expected True or False.")
     return bool(value)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from irl_gym.errors import InvalidDemonstrations
 
@@ -37,8 +38,8 @@ def as_array(raw: Any, what: str) -> np.ndarray:
 
 def is_list(raw: Any) -> bool:
     """Has it a length and positions, as arrays, lists and tuples have?"""
-    sized = hasattr(raw, "__len__") and hasattr(raw, "__getitem__") and not isinstance(raw, str | bytes | Mapping)
-    return sized and getattr(raw, "shape", None) != ()
+    sized = hasattr(raw, "__len__") and hasattr(raw, "__getitem__") and not isinstance(raw, str | bytes | Mapping | type)
+    return sized and getattr(raw, "shape", None) != () and not sp.issparse(raw)  # which has a length that it does not tell
 
 
 def numbers(raw: Any, what: str, name: Name, expected: str | None = None) -> np.ndarray:
@@ -61,7 +62,7 @@ def numbers(raw: Any, what: str, name: Name, expected: str | None = None) -> np.
         if array.dtype.kind not in "OUST":
             raise TypeError(array.dtype)
         return array.astype(np.float64)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         rows = array if array.ndim else array[None]
         for row, value in enumerate(rows):
             if not _is_numeric(value):
@@ -93,7 +94,7 @@ def _is_numeric(value: Any) -> bool:
         array = np.asarray(value)
         if array.dtype.kind in "OUST":
             array.astype(np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         return False
     return array.dtype.kind in "biufOUST"
 
@@ -119,7 +120,7 @@ def truths(raw: Any, what: str, name: Name) -> np.ndarray:
         InvalidDemonstrations: something else, named by its row.
     """
     values = as_array(raw, f"{what} flags")
-    if values.dtype.kind in "OUT":  # a file's column in which one value is no boolean, such as an empty one
+    if values.dtype.kind in "OUT" and values.ndim:  # a file's column in which one value is no boolean, such as an empty one
         words = {"true": 1, "false": 0}
         values = [words.get(one.lower(), one) if isinstance(one, str) else one for one in values]
     array = numbers(values, what, name, "true or false.")

@@ -30,7 +30,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import checked_number, float_array, is_word
 from irl_gym.discounted import Discounted
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, as_features, check_length
@@ -84,9 +84,9 @@ class FeatureLP:
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
         check_weighing(self)
-        if self.margin_cap is not None and self.margin_cap != "auto":
+        if self.margin_cap is not None and not is_word(self.margin_cap, "auto"):
             checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
-        if self.trivial_rows not in ("left out", "as printed"):
+        if not is_word(self.trivial_rows, "left out", "as printed"):
             raise InvalidParameter(f"trivial_rows is {self.trivial_rows!r}: expected 'left out' or 'as printed'.")
         checked_number("samples", self.samples, "a whole number of at least 1", least=1, whole=True)
         if isinstance(self.S_0, int | float | str | np.number):

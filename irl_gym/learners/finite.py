@@ -31,7 +31,7 @@ from typing import Any, Literal
 import numpy as np
 
 from irl_gym.certificate import Certificate, certify
-from irl_gym.checks import checked_number, float_array
+from irl_gym.checks import checked_number, float_array, is_word
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
 from irl_gym.learners import programs
@@ -75,14 +75,14 @@ class FiniteLP:
 
     def __post_init__(self) -> None:
         checked_number("r_max", self.r_max, "a bound above 0, such as 1.0", above=0)
-        if self.l1 != "auto":
+        if not is_word(self.l1, "auto"):
             checked_number("l1", self.l1, "a number of at least 0, or 'auto'", least=0)
-        if self.margin_cap is not None and self.margin_cap != "auto":
+        if self.margin_cap is not None and not is_word(self.margin_cap, "auto"):
             checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
         check_solving(self.solver, self.time_limit)
-        if self.reward_on not in ("state", "state-action"):
+        if not is_word(self.reward_on, "state", "state-action"):
             raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
-        if self.unvisited not in ("avoid", "free"):
+        if not is_word(self.unvisited, "avoid", "free"):
             raise InvalidParameter(f"unvisited is {self.unvisited!r}: expected 'avoid' or 'free'.")
         if self.slack is not None:
             checked_number("slack", self.slack, "a price of at least 1, or None for hard rows", least=1)

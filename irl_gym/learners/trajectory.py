@@ -21,7 +21,7 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidParameter
 from irl_gym.feature_sums import discounted_sums
@@ -97,7 +97,7 @@ class TrajectoryLP:
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
         check_weighing(self)
-        if self.gap_cap not in (None, "auto"):
+        if self.gap_cap is not None and not is_word(self.gap_cap, "auto"):
             raise InvalidParameter(f"gap_cap is {self.gap_cap!r}: expected 'auto' or None.")
         for name in ("trajectories", "max_rounds", "patience"):
             checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)

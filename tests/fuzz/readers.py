@@ -1,0 +1,268 @@
+"""Everything that reads a stranger's file: a valid one to begin with, and what is true of whatever is accepted."""
+
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym.ambiguity.lambda_path import LambdaPath, lambda_path
+from irl_gym.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.datasets import read_minari, write_minari
+from irl_gym.demonstrations import Episode
+from irl_gym.diagnoses.unfinished import left_behind
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.enumeration.explored import Explored, load_explored
+from irl_gym.experts import load_expert
+from irl_gym.features import OneHot, Table, Unravel
+from irl_gym.imports import from_d4rl, from_frame
+from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.page.report import write_report
+from irl_gym.policies import as_distribution
+from irl_gym.rewards import TabularReward
+from irl_gym.run_folder import RunFolder
+from irl_gym.runs import read_run, understood
+from irl_gym.shards import Shards
+from irl_gym.states import StateIndex
+from irl_gym.table_files import load_table, save_table
+from irl_gym.tabulate import tabulate
+
+LAKE = {"is_slippery": True}
+SPACE = spaces.Discrete(16)
+ROWS = [Episode(np.array([0, 4, 8, 9]), np.array([1, 1, 2]), np.array([0.0, 0.0, 1.0]), True, False, seed=i) for i in range(3)]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One."""
+
+    write: Callable[[Path], None]
+    """Fills a folder with valid files."""
+    read: Callable[[Path], None]
+    """Reads them, and asserts what is true of what was read."""
+    files: str = "**/*"
+    """Which of them are changed."""
+    documented: tuple[type[Exception], ...] = ()
+    """Errors that are none of the library's, and which it says that it raises."""
+    weight: int = 1
+    """Share of the inputs."""
+
+
+def lake():
+    return tabulate(gym.make("FrozenLake-v1", **LAKE), gamma=0.9, check_steps=20)
+
+
+def sound_table(table):
+    """P's rows sum to 1 or 0, its indices are inside, and all is finite."""
+    mdp, P = table.mdp, table.mdp.P
+    sums = P.sum(axis=1)
+    assert ((abs(sums - 1) < 1e-6) | (sums == 0)).all() and P.shape == (mdp.n_states * mdp.n_actions, mdp.n_states)
+    assert P.indices.min(initial=0) >= 0 and P.indices.max(initial=0) < mdp.n_states and P.indptr[-1] == P.nnz == P.data.size
+    assert abs(mdp.d0.sum() - 1) < 1e-6 and 0 < mdp.gamma < 1 and table.states.n_states == mdp.n_states
+    for array in (P.data, mdp.d0, table.reward.values, table.payments.mean, table.payments.deviation):
+        assert array.dtype.kind == "f" and np.isfinite(array).all()
+    assert table.reward.values.shape == table.payments.mean.shape == (mdp.n_states, mdp.n_actions)
+    assert table.payments.entries is None or table.payments.entries.shape == (P.nnz,)
+    assert str(table.evidence)
+
+
+def read_table(folder):
+    sound_table(load_table(folder / "table.npz", SPACE))
+
+
+def write_search(folder):
+    found = Explored(2)
+    found.starts[found.add(0, -1, -1, ())] = 1.0
+    found.add(1, 0, 1, (1,))
+    found.end(2)
+    found.expand(0, [(0, 0, 0.5, 0.0), (0, 1, 0.5, 1.0), (1, -1, 1.0, 0.0)])
+    found.save(folder / "search.npz", spaces.Discrete(3), {"seed": 0})
+
+
+def read_search(folder):
+    found = load_explored(folder / "search.npz", spaces.Discrete(3), 2, {"seed": 0})
+    n = len(found.keys)
+    assert all(-1 <= parent < i for i, parent in enumerate(found.parents)) and len(found.scripts) == n == len(found.ids)
+    assert all(-len(found.ends) <= one < n for one in found.successors) and np.isfinite(list(found.rewards)).all()
+    assert all(0 <= key < 3 for key in found.keys)
+    for i in range(found.n_expanded):
+        assert all(0 <= action < 2 for action, *_ in found.lines_of(i))
+
+
+def sound_reward(reward):
+    if isinstance(reward, TabularReward):
+        assert np.isfinite(reward.values).all() and reward.values.ndim in (1, 2) and np.isfinite(reward.tolerance)
+        return
+    assert np.isfinite(reward.alpha).all() and reward.alpha.shape == (reward.features.n_features,)
+    assert np.isfinite(reward.tabular(StateIndex(SPACE)).values).all() and reward.features.scaling
+
+
+def write_rewards(folder):
+    TabularReward.learned(np.linspace(-1, 1, 16), {"learner": "FiniteLP", "l1": 0.5}).save(folder / "reward.npz")
+    TabularReward(np.ones((16, 4))).save(folder / "steps.npz")
+
+
+def write_linear(folder):
+    cells = Unravel((4, 4))
+    phi = {
+        "onehot": OneHot(16), "table": Table(np.eye(16)[:, :3]),
+        "radial": RadialBasis.grid([0, 0], [3, 3], 2, coordinates=cells),
+        "fourier": Fourier([0, 0], [3, 3], 2, cells), "polynomial": Polynomial([0, 0], [3, 3], 2, cells),
+    }  # fmt: skip
+    for name, features in phi.items():
+        LinearReward(np.linspace(0, 1, features.n_features), features, {"learner": "FeatureLP"}).save(folder / f"{name}.npz")
+
+
+def read_rewards(folder):
+    for path in sorted(folder.iterdir()):
+        sound_reward(load_reward(path))
+
+
+def write_path(folder):
+    table = lake()
+    lambda_path(table.mdp, policy_iteration(table.mdp, table.reward).policy).save(folder / "path.npz")
+
+
+def read_path(folder):
+    path = LambdaPath.load(folder / "path.npz")
+    k = path.n_pieces
+    assert path.breakpoints.shape == path.gaps.shape == (k + 1,) and len(path.rewards) == len(path.margins) == k
+    assert np.isfinite(path.rewards).all() and (np.diff(path.breakpoints) >= 0).all()
+    assert str(path) and path.to_json() and np.isfinite(path.at(path.lambda_0 / 2).values).all()
+
+
+def write_experts(folder):
+    np.savez(folder / "actions.npz", actions=np.arange(16) % 4)
+    np.savez(folder / "known.npz", probabilities=np.vstack([np.full((15, 4), 0.25), np.full((1, 4), np.nan)]))
+    with zipfile.ZipFile(folder / "agent.zip", "w") as archive:
+        archive.writestr("data", json.dumps({"policy_class": {"__module__": "stable_baselines3.a2c"}, "observation_space": {}}))
+
+
+def read_experts(folder):
+    for path in sorted(folder.glob("*.npz")):
+        table = load_expert(path)
+        assert table.ndim in (1, 2) and table.size
+        if table.ndim == 2 and table.dtype.kind == "f":
+            known = table[~np.isnan(table).all(axis=1)]
+            assert np.isfinite(known).all() and (known >= 0).all() and (abs(known.sum(axis=1) - 1) < 1e-6).all()
+        else:
+            assert table.dtype.kind in "iub" and table.min() >= 0
+    load_expert(folder / "agent.zip")
+
+
+def write_shards(folder):
+    Shards(folder / "shards", SPACE).append(ROWS)
+
+
+def read_shards(folder):
+    for path in (folder / "shards").glob("*.damaged"):
+        path.unlink()
+    for one in Shards(folder / "shards", SPACE):
+        assert len(one.actions) == len(one.rewards) == len(one.observations) - 1 >= 1
+
+
+def sound_episode(one):
+    assert len(one.actions) == len(one.rewards) == len(one.observations) - 1 >= 1 and one.actions.dtype.kind in "iu"
+    assert np.isfinite(one.rewards).all()
+
+
+def write_dataset(data_format):
+    def write(folder):
+        write_minari(ROWS, "lake-v0", gym.make("FrozenLake-v1"), root=folder, algorithm="a", data_format=data_format)
+
+    return write
+
+
+def read_dataset(folder):
+    states = StateIndex(SPACE)
+    for one in read_minari("lake-v0", root=folder, states=states):
+        sound_episode(one)
+        assert (one.actions >= 0).all() and (one.actions < 4).all() and (one.seed is None or one.seed >= 0)
+        assert states.encode_batch(one.observations).max() < 16
+
+
+def write_d4rl(folder):
+    import h5py
+
+    with h5py.File(folder / "log.hdf5", "w") as file:
+        file["observations"], file["actions"] = np.array([0, 4, 8, 0, 1]), np.array([1, 1, 2, 2, 1])
+        file["next_observations"] = np.array([4, 8, 9, 1, 2])
+        file["terminals"], file["timeouts"] = np.array([0, 0, 1, 0, 0], bool), np.array([0, 0, 0, 0, 1], bool)
+        file["rewards"] = np.zeros(5)
+        file["metadata/algorithm"] = "x"
+
+
+def sound_episodes(found):
+    for one in found:
+        sound_episode(one)
+        assert (one.actions >= 0).all() and (one.actions < 4).all()
+        assert ((one.observations >= 0) & (one.observations < 16)).all()
+
+
+def read_d4rl(folder):
+    sound_episodes(from_d4rl(folder / "log.hdf5", space=SPACE, n_actions=4))
+
+
+COLUMNS = {
+    "episode": [0, 0, 0, 1, 1], "step": [0, 1, 2, 0, 1], "observation": [0, 4, 8, 0, 1], "action": [1, 1, 2, 2, 1],
+    "reward": [0.0, 0.0, 1.0, 0.0, 0.0], "terminated": [False, False, True, False, False],
+}  # fmt: skip
+
+
+def write_frames(folder):
+    import pandas as pd
+
+    frame = pd.DataFrame(COLUMNS)
+    frame.to_csv(folder / "log.csv", index=False)
+    frame.to_csv(folder / "log.tsv", index=False, sep="\t")
+    frame.to_parquet(folder / "log.parquet")
+
+
+def read_frames(folder):
+    for path in sorted(folder.iterdir()):
+        sound_episodes(from_frame(path, space=SPACE, n_actions=4))
+
+
+def sound_run(folder):
+    run = read_run(folder)
+    sound_table(run.table)
+    sound_reward(run.learned)
+    for policy in (run.expert, run.agent):
+        as_distribution(policy, run.table.mdp.n_states, run.table.mdp.n_actions)
+    assert all(one.shape == (16,) for one in run.widths.values()) and run.curve.value.dtype.kind == "f"
+
+
+def read_page(folder):
+    with understood(folder):
+        write_report(read_run(folder), folder.parent / "page.html")
+
+
+def read_folder(folder):
+    config = json.loads((folder.parent / "config.json").read_text())
+    run = RunFolder(folder, config)
+    for stage in ("table", "reward", "agent"):
+        run.done(stage)
+    left_behind(folder)
+
+
+READERS = {
+    "table": Reader(lambda folder: save_table(lake(), folder / "table.npz"), read_table, weight=3),
+    "search": Reader(write_search, read_search, weight=2),
+    "reward": Reader(write_rewards, read_rewards),
+    "linear reward": Reader(write_linear, read_rewards, weight=2),
+    "lambda path": Reader(write_path, read_path),
+    "expert": Reader(write_experts, read_experts),
+    "shards": Reader(write_shards, read_shards),
+    "Minari, HDF5": Reader(write_dataset("hdf5"), read_dataset, "lake-v0/data/*", weight=3),
+    "Minari, Arrow": Reader(write_dataset("arrow"), read_dataset, "lake-v0/data/**/*", weight=2),
+    "D4RL": Reader(write_d4rl, read_d4rl),
+    "frames": Reader(write_frames, read_frames, weight=2),
+    "run": Reader(lambda folder: None, sound_run, "**/*", weight=3),
+    "page of a run": Reader(lambda folder: None, read_page, "*.*"),
+    "resumed run": Reader(lambda folder: None, read_folder, "**/*"),
+}
+"""By what they read. A run is made once for all tests, and copied."""

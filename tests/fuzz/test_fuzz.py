@@ -1,0 +1,94 @@
+"""Whatever is in a file, only errors of ours and documented ones come out, and what is accepted is sound.
+
+2,000 inputs in CI, spread over all readers; the slow test reads 100,000.
+"""
+
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+from fuzz.mutations import CHANGES, changed
+from fuzz.readers import READERS
+from hypothesis import HealthCheck, given, settings
+
+from irl_gym import experts
+from irl_gym.errors import InvalidParameter, IrlGymError
+from irl_gym.experiment import Experiment
+from irl_gym.pipeline import recover_and_retrain
+from irl_gym.planners import ValueIteration
+
+SMALL, MANY = 1_700, 95_000
+"""Inputs of files; the rest of 2,000 and 100,000 are arguments."""
+TOTAL = sum(one.weight for one in READERS.values())
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The folder of a run."""
+    out = tmp_path_factory.mktemp("fuzz") / "run"
+    asked = Experiment("FrozenLake-v1", 0.9, retrain=ValueIteration(), episodes=3, eval_episodes=3, num_envs=2)
+    recover_and_retrain(asked, out)
+    return out
+
+
+@pytest.fixture
+def no_agent(monkeypatch):
+    """The zip of an agent is looked at, and not loaded: loading it runs what is in it."""
+
+    def refused(path, *_):
+        raise InvalidParameter(f"{path} is not loaded in a test.")
+
+    monkeypatch.setattr(experts, "load_agent", refused)
+
+
+def fuzz(name, finished, folder, inputs):
+    reader = READERS[name]
+    if "run" in name:
+        shutil.copytree(finished, folder / "run")
+        shutil.copy(finished / "config.json", folder)
+        folder = folder / "run"
+    reader.write(folder)
+    files = {path: path.read_bytes() for path in sorted(folder.glob(reader.files)) if path.is_file()}
+    files = {path: data for path, data in files.items() if path.suffix not in (".html", ".png", ".webp") and data}
+
+    @settings(max_examples=inputs, suppress_health_check=list(HealthCheck))
+    @given(CHANGES)
+    def read(change):
+        path = change.pick(files)
+        try:
+            changed(path, change)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of Gymnasium and Minari, about what they read
+                reader.read(folder)
+        except (IrlGymError, FileNotFoundError, *reader.documented):
+            pass
+        finally:
+            for path, data in files.items():
+                if not path.exists() or path.read_bytes() != data:
+                    path.write_bytes(data)
+
+    read()
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_changed_file_is_refused_by_an_error_of_ours_or_read_as_something_sound(name, finished, tmp_path, no_agent):
+    fuzz(name, finished, tmp_path, SMALL * READERS[name].weight // TOTAL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
+def test_each_of_100_000_inputs_is_refused_by_an_error_of_ours_or_read_as_something_sound(name, finished, tmp_path, no_agent):
+    forget_peak()
+    fuzz(name, finished, tmp_path, MANY * READERS[name].weight // TOTAL)
+    assert peak() < 1e9
+
+
+def forget_peak():
+    Path("/proc/self/clear_refs").write_text("5")
+
+
+def peak():
+    """Bytes of memory held at most since it was forgotten."""
+    told = Path("/proc/self/status").read_text()
+    return 1024 * int(told.partition("VmHWM:")[2].split()[0])

@@ -1,6 +1,5 @@
 """An expert that is given as a file: SB3's zip of an agent, or an npz of a table's actions, as runs leave them."""
 
-import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.errors import DatasetMismatch, InvalidParameter, NotTabular
 from irl_gym.experts import load_expert
+from irl_gym.own_files import digest
 from irl_gym.planners import Agent, Progress
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.tabular_vec_env import TabularVecEnv
@@ -69,11 +69,6 @@ class FromFile:
 def is_file(path: Any) -> bool:
     """Is this the path of a file that is there?"""
     return isinstance(path, str | os.PathLike) and Path(path).is_file()
-
-
-def digest(path: str) -> str:
-    """The sha256 of a file."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def _fitting(agent: Agent, env: gym.Env | VecEnv) -> Agent:

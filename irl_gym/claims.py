@@ -17,7 +17,19 @@ from minari.serialization import serialize_space
 
 from irl_gym.errors import RunConflict, RunNewer
 from irl_gym.names import action_names
-from irl_gym.run_folder import RunFolder, is_empty, read_json, write_json
+from irl_gym.run_folder import (
+    NOT_THE_SAME,
+    RECORDS,
+    START,
+    RunFolder,
+    changed,
+    digests,
+    is_empty,
+    read_json,
+    read_record,
+    write_json,
+    write_record,
+)
 from irl_gym.table_files import TABLE, UNDER_WAY
 
 NUMBER = 1
@@ -37,7 +49,7 @@ def claim(path: Path, config: dict[str, Any]) -> None:
     """Refuse a folder of another run before any work, but take over one in which no stage was finished, without its table.
 
     Raises:
-        RunConflict: it holds another run, or files that are no run at all.
+        RunConflict: it holds another run, files that are no run at all, or a file that is not the one that the run left.
         RunNewer: it holds a run of a newer version.
     """
     if not path.exists() or is_empty(path):
@@ -52,8 +64,12 @@ def claim(path: Path, config: dict[str, Any]) -> None:
     before = known.read_bytes() if known.exists() else None
     RunFolder(path, config)
     if before not in (None, known.read_bytes()):
-        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT):
+        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT, f"{RECORDS}/{START}.json"):
             (path / name).unlink(missing_ok=True)
+    recorded = (read_record(path, START) or {}).get("sha256", {})
+    other = changed(path, {"sha256": {name: one for name, one in recorded.items() if name in (VERSION, ENVIRONMENT)}})
+    if other is not None:
+        raise RunConflict(f"{path / other} {NOT_THE_SAME}. Delete it, and it is written again.")
 
 
 def check_format(path: Path, told: Mapping[str, Any]) -> None:
@@ -89,6 +105,31 @@ def write_environment(path: Path, env: gym.Env, env_id: str | None, kwargs: Any 
         observations = serialize_space(env.observation_space)  # text, as Minari keeps it: bounds may be infinite
         told = {"id": env_id, "observations": observations, "actions": [*action_names(env)], "kwargs": kwargs}
         write_json(path / ENVIRONMENT, told)
+
+
+def record_start(path: Path, *, table_kept: bool) -> None:
+    """Record the digests of what a run begins with. The table has to be the one that its stages were made from.
+
+    Args:
+        path: the folder.
+        table_kept: the table was there; else it has just been made.
+
+    Raises:
+        RunConflict: it is another table.
+    """
+    names = [name for name in ("config.json", VERSION, ENVIRONMENT, TABLE) if (path / name).exists()]
+    now = {"files": names, "sha256": digests(path, names)}
+    before = read_record(path, START) or {}
+    if changed(path, {"sha256": {name: one for name, one in before.get("sha256", {}).items() if name == TABLE}}):
+        told = (
+            f"{NOT_THE_SAME}. Delete it, and it is made again"
+            if table_kept
+            else "was made again, and is another than the run's stages were made from: expected the same bytes. Was the run "
+            "begun by another version of irl_gym? Choose another --out"
+        )
+        raise RunConflict(f"{path / TABLE} {told}.")
+    if before != now:
+        write_record(path, START, now)
 
 
 def into_folder(command: Sequence[str], folder: str = AGAIN) -> list[str]:

@@ -27,10 +27,11 @@ from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.experiment import as_config
 from irl_gym.experts import Acting, load_expert
 from irl_gym.export import Demonstrator
-from irl_gym.given import check_agent, digest, is_file
+from irl_gym.given import check_agent, is_file
 from irl_gym.mdp import check_discount
 from irl_gym.minari_files import spec_json, unkept
 from irl_gym.noise import Noisy, checked_epsilon, noisy
+from irl_gym.own_files import digest
 from irl_gym.planners import SB3, Agent, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.states import StateIndex

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.errors import DatasetMismatch, InvalidParameter, NotTabular
 from irl_gym.experts import load_expert
+from irl_gym.own_files import digest
 from irl_gym.planners import Agent, Progress
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.shown import beside
@@ -35,13 +36,13 @@ class FromFile:
     def __post_init__(self) -> None:
         if not is_file(self.path):
             raise InvalidParameter(f"expert is {self.path!r}, which is no file: expected SB3's zip, or an npz of actions.")
-        if self.sha256 is not None and self.sha256 != digest(self.path):
+        if self.sha256 is not None and self.sha256 != fingerprint(self.path):
             raise InvalidParameter(f"{self.path} is not the file that it was (sha256 {self.sha256[:8]}...): expected the same.")
 
     @classmethod
     def at(cls, path: str) -> "FromFile":
         """The expert in a file, with the file's digest."""
-        return cls(path, digest(path) if is_file(path) else None)
+        return cls(path, fingerprint(path) if is_file(path) else None)
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Policy:
         """The policy in the file.
@@ -72,12 +73,10 @@ def is_file(path: Any) -> bool:
     return isinstance(path, str | os.PathLike) and Path(path).is_file()
 
 
-def digest(path: str) -> str:
-    """The sha256 of a file, and of what says what an agent in it is shown."""
-    found = hashlib.sha256(Path(path).read_bytes())
-    if beside(path).is_file():
-        found.update(beside(path).read_bytes())
-    return found.hexdigest()
+def fingerprint(path: str) -> str:
+    """The sha256 of a file; where another says what an agent in it is shown, of the digests of both."""
+    shown = beside(path)
+    return hashlib.sha256((digest(path) + digest(shown)).encode()).hexdigest() if shown.is_file() else digest(path)
 
 
 def _fitting(agent: Agent, env: gym.Env | VecEnv) -> Agent:

@@ -27,7 +27,7 @@ import numpy as np
 
 from irl_gym import figures, final_stages
 from irl_gym.choices import environment_of
-from irl_gym.claims import claim, write_environment, write_version
+from irl_gym.claims import claim, record_start, write_environment, write_version
 from irl_gym.curves import write_curve
 from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
@@ -52,7 +52,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
-from irl_gym.table_files import keep_table
+from irl_gym.table_files import TABLE, keep_table
 from irl_gym.worlds import SteppedWorld, TableWorld
 
 OnProgress = Callable[[str, float], None]
@@ -102,8 +102,10 @@ class Loop:
         self.folder = RunFolder(path, config)
         write_version(path, command)
         write_environment(path, self.env, self.env_id, None if self.env.spec is None else as_config(self.env.spec.kwargs))
+        table_kept = (path / TABLE).exists()
         if isinstance(self.world, TableWorld):
             keep_table(self.world.table, path)
+        record_start(path, table_kept=table_kept)
         self.report_progress("table", 1.0)
 
     def stage(self, name: str) -> dict[str, Any]:

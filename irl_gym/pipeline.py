@@ -59,6 +59,7 @@ def recover_and_retrain(
         report.html                                   all of it, on a page
     The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
     that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage.
+    .stages/ has the sha256 of every file that is read again: one that is another is named, and nothing is made from it.
 
     Args:
         experiment: what to do.

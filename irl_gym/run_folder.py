@@ -3,6 +3,10 @@
 Each stage writes into a hidden folder beside and its files are renamed into place; then a record says it is done. A run that
 was killed and is started again with the same configuration continues after the last stage recorded. Another configuration
 in the same folder is refused, never overwritten. Whoever runs stages holds the folder meanwhile (`own_files.held`).
+
+A record holds the sha256 of each file of its stage that is read again, and whoever reads or continues the run compares them.
+That tells a file that was damaged, changed, or copied from another run. It is no seal: who rewrites the records too can forge
+a run.
 """
 
 import json
@@ -10,19 +14,27 @@ import os
 import shutil
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from irl_gym.errors import RunConflict
-from irl_gym.own_files import LOCK, scratch, write_bytes
+from irl_gym.own_files import LOCK, digest, scratch, write_bytes
 
+NOT_THE_SAME = "is not the file that the run left, by its sha256: it was changed, damaged, or copied from another run"
 RECORDS = ".stages"
 """Where the records of finished stages are, in the folder of a run."""
 
 LOGS = "tensorboard"
 """A folder that several stages write into. No record lists its files, which hold the time and the host's name: who deletes
 them loses no result, and no stage is run again."""
+
+
+START = "start"
+"""The record of what a run begins with: its configuration, who made it, where it takes place, and its table."""
+
+FOR_PEOPLE = ("figures/", "report.html", "metrics.csv")
+"""Files that no stage and no page is made from. Who changes them, or makes them again, changes nothing that is read."""
 
 
 def write_text(path: Path, text: str) -> None:
@@ -48,6 +60,35 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or not content:
         raise ValueError(f"expected an object with something in it, found {content!r:.40}")
     return content
+
+
+def digests(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """The sha256 of those of a folder's files that are read again, by their names."""
+    return {name: digest(folder / name) for name in names if not name.startswith(FOR_PEOPLE)}
+
+
+def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
+    """The record of a finished stage; None where there is none, or it is no record of files in the folder."""
+    try:
+        record = read_json(folder / RECORDS / f"{stage}.json")
+        recorded = record.get("sha256", {})
+        inside = all(not Path(name).is_absolute() and ".." not in Path(name).parts for name in (*record["files"], *recorded))
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    return record if inside and isinstance(recorded, dict) else None
+
+
+def write_record(folder: Path, stage: str, record: Mapping[str, Any]) -> None:
+    """Write the record of a stage, which is finished with it."""
+    (folder / RECORDS).mkdir(exist_ok=True)
+    write_json(folder / RECORDS / f"{stage}.json", record)
+
+
+def changed(folder: Path, record: Mapping[str, Any]) -> str | None:
+    """The first file that is there and not the one that was recorded; None where there is none, or nothing was recorded."""
+    recorded = record.get("sha256", {})
+    there = (name for name in sorted(recorded) if (folder / name).is_file())
+    return next((name for name in there if digest(folder / name) != recorded[name]), None)
 
 
 class RunFolder:
@@ -82,19 +123,17 @@ class RunFolder:
                 f"{known} is not json ({error}): expected a run's configuration. Choose another --out."
             ) from error
         now = dict(_leaves(wanted))
-        changed = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
-        if before and changed and not any((self.path / RECORDS).glob("*.json")):  # nothing was finished: nothing is lost
+        different = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
+        finished = [one for one in (self.path / RECORDS).glob("*.json") if one.stem != START]
+        if before and different and not finished:  # nothing is lost
             write_json(known, wanted)
             return
-        if changed:
-            key = changed[0]
+        if different:
+            key = different[0]
             raise RunConflict(
                 f"{self.path} holds another run: its {key} is {before.get(key)!r}, this one's is {now.get(key)!r}. Choose "
                 "another --out, or delete the folder."
             )
-
-    def _record(self, stage: str) -> Path:
-        return self.path / RECORDS / f"{stage}.json"
 
     def done(self, stage: str) -> bool:
         """Was this stage finished, now or in an earlier run, and are its files still there?"""
@@ -102,12 +141,13 @@ class RunFolder:
 
     def _read(self, stage: str) -> dict[str, Any] | None:
         """The record of a finished stage; None if there is none, it cannot be read, or a file of the stage is gone."""
-        try:
-            record = json.loads(self._record(stage).read_text())
-            whole = all((self.path / name).exists() for name in record["files"])
-        except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        record = read_record(self.path, stage)
+        if record is None or not all((self.path / name).exists() for name in record["files"]):
             return None
-        return record if whole else None
+        other = changed(self.path, record)
+        if other is not None:
+            raise RunConflict(f"{self.path / other} {NOT_THE_SAME}. Delete it, and its stage is run again.")
+        return record
 
     def load(self, name: str, read: Callable[[Path], Any]) -> Any:
         """Read a file that a stage left.
@@ -131,7 +171,10 @@ class RunFolder:
             make: writes the stage's files into the folder it is given, and returns a record of json values.
 
         Returns:
-            The record, with `seconds` and `files`; and `kept`, true, if the stage was finished in an earlier run.
+            The record, with `seconds`, `files` and their `sha256`; and `kept`, true, if an earlier run finished the stage.
+
+        Raises:
+            RunConflict: a file of a finished stage is not the one that it left.
         """
         finished = self._read(stage)
         if finished is not None:
@@ -141,9 +184,9 @@ class RunFolder:
             record = {**make(beside), "seconds": time.perf_counter() - start}
             made = [one.relative_to(beside) for one in beside.rglob("*") if one.is_file()]
             record["files"] = sorted(one.as_posix() for one in made if one.parts[0] != LOGS)
+            record["sha256"] = digests(beside, record["files"])
             _move(beside, self.path)
-        self._record(stage).parent.mkdir(exist_ok=True)
-        write_json(self._record(stage), record)
+        write_record(self.path, stage, record)
         return record
 
 

@@ -24,7 +24,7 @@ from irl_gym.names import state_name
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RECORDS, read_json
+from irl_gym.run_folder import NOT_THE_SAME, START, changed, read_json, read_record
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
@@ -77,6 +77,8 @@ class Run:
     lambda_path: Mapping[str, Any] | None
     """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
     exact, whether these are all pieces, and gap, what others can be worth."""
+    vouched: bool
+    """Are digests recorded of the files that are read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
     """Is what the metrics say of the expert's loss under the reward computed from these files, not the run's record?"""
 
@@ -91,6 +93,11 @@ class Run:
     def command(self) -> str | None:
         """The command that reproduces the run, for a shell; None where it was started from Python, or nobody noted it."""
         return shell_command(self.version.get("command"))
+
+    @property
+    def caution(self) -> str | None:
+        """What is to be said of files that no digests vouch for; None where some do."""
+        return None if self.vouched else "Nothing vouches for this run's files: as in earlier versions, no digests are kept."
 
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.
@@ -112,7 +119,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         table: the run's, if it is at hand; else it is read.
 
     Raises:
-        RunIncomplete: no run, one that was killed before its end, or a file of it is gone or damaged.
+        RunIncomplete: no run, one that was killed before its end, or a file of it is gone, damaged, or not the one it left.
         RunConflict: no run of this library, or one with a link that leads out of its folder.
         RunNewer: a newer version wrote it.
     """
@@ -126,10 +133,13 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     check_format(path, version)
     reader.command = version.get("command")
     config = reader.read("config.json", read_json)
-    stages = {name: record for name in STAGES if (record := reader.record(name)) is not None}
+    records = {name: record for name in (START, *STAGES) if (record := read_record(path, name)) is not None}
+    stages = {name: record for name, record in records.items() if name != START}
     for name in FIRST if older else STAGES[:-1]:
         if name not in stages:
             raise reader.incomplete(f"the stage {name!r} was not finished")
+    for record in records.values():
+        reader.check(record)
     env_id, observations, names = _environment(reader)
     metrics = reader.read("metrics.json", read_json)
     on_table = metrics.get("table") is not None
@@ -147,6 +157,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         diagnosis=reader.maybe("diagnosis.json", read_json),
         widths=reader.maybe("ambiguity.npz", lambda one: _part(one, "widths")),
         lambda_path=reader.maybe("ambiguity.npz", lambda one: _part(one, "path")),
+        vouched=START in records and all("sha256" in one for one in records.values()),
     )  # fmt: skip
     _check_shapes(run, reader)
     return _with_proof(run, reader)
@@ -219,12 +230,12 @@ class _Reader:
         """The content of a file that not every run has."""
         return self.read(name, read) if (self.path / name).exists() else None
 
-    def record(self, stage: str) -> dict[str, Any] | None:
-        """The record of a stage; None where it was not finished."""
-        try:
-            return read_json(self.path / RECORDS / f"{stage}.json")
-        except (OSError, ValueError):
-            return None
+    def check(self, record: Mapping[str, Any]) -> None:
+        """Check that files are those that were recorded."""
+        name = changed(self.path, record)
+        if name is not None:
+            told = f"{name} {NOT_THE_SAME}"
+            raise self.lost(told) if name in ONCE else self.incomplete(f"{told}; delete it, and it is made again")
 
 
 def _environment(reader: _Reader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:

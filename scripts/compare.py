@@ -40,7 +40,9 @@ def main(arguments: Arguments) -> int:
         runs = [_read(folder) for folder in arguments.runs]
         with understood(*arguments.runs):
             write_comparison(runs, arguments.out)
-            together = [told(pool) for pool in pools(lettered(runs))]
+            together = [told(pool) for pool in pools(lettered(runs))] + [
+                f"{run.path}: {run.caution}" for run in runs if run.caution is not None
+            ]
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2

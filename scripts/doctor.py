@@ -81,6 +81,8 @@ def main(arguments: Arguments) -> int:
     if diagnosis is None:
         return 2
     show(diagnosis, console, run)
+    if run is not None and run.caution is not None:
+        console.print(Text(f"\n{run.caution}"))
     complete = unfinished is None and not without_page(run, console)
     return 0 if diagnosis.healthy and complete else 1
 

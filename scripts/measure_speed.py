@@ -1,4 +1,4 @@
-"""Measure the speed and memory bars: linear programs, planning, vectorised stepping, PPO, import.
+"""Measure the speed and memory bars: linear programs, planning, vectorised stepping, PPO, import, digests.
 Each measurement runs in a process of its own, for its peak memory. Ratios are of one run.
 """
 
@@ -6,8 +6,10 @@ import multiprocessing
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -15,7 +17,20 @@ import numpy as np
 import tyro
 from stable_baselines3.common.env_util import make_vec_env
 
-from irl_gym import SB3, FiniteLP, TabularVecEnv, policy_iteration, tabulate, value_iteration
+from irl_gym import (
+    SB3,
+    Experiment,
+    FiniteLP,
+    TabularVecEnv,
+    ValueIteration,
+    policy_iteration,
+    recover_and_retrain,
+    tabulate,
+    value_iteration,
+)
+from irl_gym.claims import STAGES
+from irl_gym.own_files import check_links
+from irl_gym.run_folder import START, changed, read_record
 from irl_gym.terminal import print_table
 
 GRID = "irl_gym_envs:irl_gym/GridWorld-v0"
@@ -89,8 +104,26 @@ def importing() -> str:
     return f"{np.median(made):.3f} s"
 
 
+def checking() -> str:
+    """The check of all digests of a run, the median of 9, against a run that is short: nothing is trained, few episodes."""
+    with tempfile.TemporaryDirectory() as folder:
+        asked = Experiment("FrozenLake-v1", 0.99, retrain=ValueIteration(), episodes=10, eval_episodes=10)
+        start = time.perf_counter()
+        path = recover_and_retrain(asked, Path(folder, "run")).out
+        whole, times = time.perf_counter() - start, []
+        for _ in range(9):
+            start = time.perf_counter()
+            check_links(path)
+            records = [read_record(path, name) or {} for name in (START, *STAGES)]
+            assert not any(changed(path, record) for record in records)
+            times.append(time.perf_counter() - start)
+        files = sum(len(record["sha256"]) for record in records)
+    return f"{files} files, {1000 * np.median(times):.1f} ms of {whole:.1f} s: {np.median(times) / whole:.2%}"
+
+
 MEASUREMENTS: list[tuple[str, str, Callable[..., str], tuple, dict]] = [
     ("import irl_gym", "< 0.3 s", importing, (), {}),
+    ("digests of a run", "< 2 % of the run", checking, (), {}),
     ("LP, 30x30, gamma 0.9, default", "< 1 s, < 500 MB", linear_program, (30, 0.9), {}),
     ("LP, 30x30, gamma 0.9, NR lambda = 0", "< 1 s, < 500 MB", linear_program, (30, 0.9), {"margin_cap": None}),
     ("LP, 100x100, gamma 0.99, default", "< 20 s, < 500 MB", linear_program, (100, 0.99), {}),

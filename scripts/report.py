@@ -36,11 +36,12 @@ def main(arguments: Arguments) -> int:
         if arguments.out is not None:
             check_writable(out)
         with understood(arguments.run):
-            write_report(read_run(arguments.run), out)
+            run = read_run(arguments.run)
+            write_report(run, out)
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
-    Console(soft_wrap=True).print(Text(f"Wrote {out}."))
+    Console(soft_wrap=True).print(Text(" ".join(filter(None, (f"Wrote {out}.", run.caution)))))
     return 0
 
 

@@ -8,6 +8,7 @@ import shutil
 import gymnasium as gym
 import numpy as np
 import pytest
+from forgetting import without_digests
 from tiny_env import TableEnv, lottery
 
 from irl_gym.claims import write_environment
@@ -50,6 +51,11 @@ def run(finished):
 @pytest.fixture
 def copied(finished, tmp_path):
     return shutil.copytree(finished, tmp_path / "copy")
+
+
+@pytest.fixture
+def unvouched(copied):
+    return without_digests(copied)
 
 
 def test_a_run_knows_its_command_as_a_shell_reads_it(run):
@@ -149,10 +155,10 @@ def test_a_run_without_a_file_is_incomplete_by_name(copied, name):
 
 
 @pytest.mark.parametrize("name", ["reward.npz", "metrics.json", "grid.json", "ambiguity.npz", "films/agent.json", "table.npz"])
-def test_a_run_with_a_damaged_file_is_incomplete_by_name(copied, name):
-    (copied / name).write_bytes(b"[1]")
+def test_a_run_with_a_damaged_file_is_incomplete_by_name(unvouched, name):
+    (unvouched / name).write_bytes(b"[1]")
     with pytest.raises(RunIncomplete, match=f"{name} cannot be read"):
-        read_run(copied)
+        read_run(unvouched)
 
 
 def test_a_copied_run_is_continued_where_it_is_and_not_where_it_came_from(finished, copied):
@@ -164,7 +170,8 @@ def test_a_copied_run_is_continued_where_it_is_and_not_where_it_came_from(finish
 
 
 @pytest.mark.parametrize("name", ["reward.npz", "expert.npz", "agent_policy.npz"])
-def test_a_run_with_a_file_of_another_table_is_incomplete_by_name(copied, name):
+def test_a_run_with_a_file_of_another_table_is_incomplete_by_name(unvouched, name):
+    copied = unvouched
     other = np.zeros(36, dtype=np.int64)
     TabularReward(other).save(copied / name) if name == "reward.npz" else np.savez(copied / name, actions=other)
     with pytest.raises(RunIncomplete, match=rf"copy is incomplete: {name} has shape \(36,\).*\(16,\) or \(16, 4\); delete it"):
@@ -172,7 +179,8 @@ def test_a_run_with_a_file_of_another_table_is_incomplete_by_name(copied, name):
 
 
 @pytest.mark.parametrize("name", ["config.json", "run.json"])
-def test_a_run_whose_start_is_damaged_is_to_be_made_again_in_a_new_folder(copied, name):
+def test_a_run_whose_start_is_damaged_is_to_be_made_again_in_a_new_folder(unvouched, name):
+    copied = unvouched
     (copied / name).write_text("{")
     with pytest.raises(RunIncomplete, match=rf"{name} cannot be read") as told:
         read_run(copied)
@@ -182,7 +190,8 @@ def test_a_run_whose_start_is_damaged_is_to_be_made_again_in_a_new_folder(copied
 
 
 @pytest.mark.parametrize("name", ["config.json", "run.json", "metrics.json", "environment.json", "films/agent.json"])
-def test_json_that_is_nested_too_deeply_is_damage(copied, name):
+def test_json_that_is_nested_too_deeply_is_damage(unvouched, name):
+    copied = unvouched
     (copied / name).write_text("[" * 100_000)
     with pytest.raises(RunIncomplete, match=rf"{name} cannot be read.*nested too deeply"):
         read_run(copied)
@@ -280,8 +289,10 @@ def test_a_record_that_cannot_be_computed_again_is_told_as_one(copied):
 
 
 @pytest.fixture
-def older(copied):
+def older(unvouched):
     """A run as version 0.1 left it."""
+    copied = unvouched
+    (copied / ".stages" / "start.json").unlink()
     for name in ("films", "tensorboard"):
         shutil.rmtree(copied / name)
     for name in ("run.json", "environment.json", "grid.json", "metrics.csv", "ambiguity.npz", "diagnosis.json", "report.html"):

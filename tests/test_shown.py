@@ -10,7 +10,7 @@ from irl_gym.demonstrators import Recording
 from irl_gym.errors import DatasetMismatch, InvalidParameter
 from irl_gym.experiment import Experiment
 from irl_gym.experts import load_expert
-from irl_gym.given import FromFile, check_agent, digest
+from irl_gym.given import FromFile, check_agent, fingerprint
 from irl_gym.listed_states import ListedStates
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
@@ -96,9 +96,9 @@ def test_a_file_beside_it_that_says_nothing_is_refused(toy_text, tmp_path):
 
 def test_the_file_beside_it_is_part_of_what_a_run_knows_again(toy_text, tmp_path):
     SHORT.plan(lake(toy_text, StateIndex(SPACES["pairs"])), gamma=0.9).save(tmp_path / "agent.zip")
-    before = digest(str(tmp_path / "agent.zip"))
+    before = fingerprint(str(tmp_path / "agent.zip"))
     (tmp_path / "agent.shown.npz").write_text("something else")
-    assert digest(str(tmp_path / "agent.zip")) != before
+    assert fingerprint(str(tmp_path / "agent.zip")) != before
 
 
 def test_an_agent_of_another_numbering_is_refused(toy_text, tmp_path):

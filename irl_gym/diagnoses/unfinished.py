@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.claims import FIRST
 from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent
 from irl_gym.demonstrations import empirical_policy
@@ -17,7 +18,7 @@ from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RECORDS, read_json
+from irl_gym.run_folder import RECORDS, START, changed, read_json, read_record
 from irl_gym.runs import SURPRISES
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
@@ -25,9 +26,11 @@ from irl_gym.told_spaces import told_space
 
 
 def left_behind(path: Path) -> Case | None:
-    """The case that a folder's files make; None where they are not enough, or cannot be read."""
+    """The case that a folder's files make; None where they are not enough, cannot be read, or are not those that a run left."""
     try:
         check_links(path)
+        if any(changed(path, read_record(path, stage) or {}) for stage in (START, *FIRST)):
+            return None
         config = read_json(path / "config.json")
         space = told_space("observations", read_json(path / "environment.json")["observations"])
         table = load_table(path / TABLE, space)

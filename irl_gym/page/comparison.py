@@ -86,6 +86,7 @@ def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
     ]
     kept = [section for section in sections if section is not None]
     facts = [(letter, f"{run_title(run, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
+    facts += [(letter, run.caution) for letter, run in named.items() if run.caution is not None]
     context = {"title": f"{len(named)} runs side by side", "facts": facts, "sentence": sentence(named, found), "sections": kept}
     return context, {"figures": specs(kept), "slider": None, "episodes": {}}
 

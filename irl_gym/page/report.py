@@ -89,6 +89,8 @@ def facts(run: Run) -> list[tuple[str, str]]:
         told.append(("dataset", str(config["dataset"])))
     if run.version.get("irl_gym"):
         told.append(("irl_gym", str(run.version["irl_gym"])))
+    if run.caution is not None:
+        told.append(("files", run.caution))
     return told
 
 

@@ -57,7 +57,7 @@ def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=
         grid=layout,
         films=films_of(env, env_id, table, result.reward, {"expert": expert, "agent": agent}, seed, frames) if films else {},
         diagnosis=diagnosis_of(acting), widths=widths_of(table, result.reward),
-        lambda_path=path_of(mdp, expert, reward_on) if reward_on == "state" else None, recomputed=True,
+        lambda_path=path_of(mdp, expert, reward_on) if reward_on == "state" else None, recomputed=True, vouched=True,
     )  # fmt: skip
 
 
@@ -193,5 +193,5 @@ def stepped_run(path, *, seed=0):
         curve=Curve(*np.array([[0.0, 30_000, 60_000], [20, 60, 85], [22, 200, 450], [20, 150, 420], [24, 240, 480]])),
         stages={"agent": {"seconds": 50.0, "environment_steps": 60_000}}, grid=None,
         films={"agent": Film("agent", 3, tuple(moments), "cut", (), "webp", "pygame is not installed.")},
-        diagnosis={"healthy": True, "findings": []}, widths=None, lambda_path=None,
+        diagnosis={"healthy": True, "findings": []}, widths=None, lambda_path=None, vouched=True,
     )  # fmt: skip

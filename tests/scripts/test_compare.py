@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+from forgetting import without_digests
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +42,16 @@ def test_a_folder_that_is_no_run_is_named(script, finished):
 
 def test_the_one_damaged_run_of_many_is_named_alone(script, finished):
     shutil.copytree(finished / "plain", finished / "damaged", dirs_exist_ok=True)
-    (finished / "damaged" / "metrics.json").write_text('{"policies": [], "table": {"states": 16}, "reward": "good"}')
+    (without_digests(finished / "damaged") / "metrics.json").write_text(
+        '{"policies": [], "table": {"states": 16}, "reward": "good"}'
+    )
     made = script("compare", "plain", "priced", "damaged", cwd=finished)
     assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: damaged cannot be understood"), made.stderr
 
 
 def test_json_that_is_nested_too_deeply_gets_one_clear_line(script, finished):
     shutil.copytree(finished / "plain", finished / "deep", dirs_exist_ok=True)
-    (finished / "deep" / "certificate.json").write_text('{"a":' * 100_000)
+    (without_digests(finished / "deep") / "certificate.json").write_text('{"a":' * 100_000)
     made = script("compare", "plain", "deep", cwd=finished)
     assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: deep is incomplete: certificate.json cannot be read")
     assert made.stderr.count("\n") == 1
@@ -57,10 +60,11 @@ def test_json_that_is_nested_too_deeply_gets_one_clear_line(script, finished):
 def test_seeds_of_one_setting_are_told_together(script, finished):
     for seed in (0, 1):
         shutil.copytree(finished / "plain", finished / f"seed{seed}", dirs_exist_ok=True)
-        config = finished / f"seed{seed}" / "config.json"
+        config = without_digests(finished / f"seed{seed}") / "config.json"
         config.write_text(json.dumps({**json.loads(config.read_text()), "seed": seed}))
     made = script("compare", "seed0", "seed1", cwd=finished)
-    line, wrote = made.stdout.splitlines()
+    line, *cautions, wrote = made.stdout.splitlines()
+    assert [one.partition(":")[0] for one in cautions] == ["seed0", "seed1"] and "Nothing vouches for" in cautions[0]
     assert line.startswith("runs A, B, mean over 2 seeds: score 1.000 (too few to say), mean return 0.")
     assert line.endswith("; good (1.000 of value, 1.000 of mean return)") and wrote.startswith("Wrote compare.html")
 

@@ -83,6 +83,8 @@ class Demonstrations:
 
     expert: Annotated[str | None, UNSET] = None
     """value-iteration, on a table; ppo, dqn or a2c, trained on the true reward; or a file, SB3's zip or an npz of actions."""
+    expert_normalize: Annotated[str | None, UNSET] = None
+    """Statistics of its observations, of a zip trained under SB3's VecNormalize: the file of its save, or an npz."""
     epsilon: float = 0.0
     """Probability of a random action in place of the expert's. Above 0 learners see the episodes only, not the policy."""
     episodes: int = 500
@@ -101,9 +103,14 @@ class Demonstrations:
         """The expert's file; None for an expert that has a name.
 
         Raises:
-            InvalidParameter: no such expert.
+            InvalidParameter: no such expert, or statistics of one that has no file.
         """
         if self.expert is None or self.expert in get_args(PlannerName):
+            if self.expert_normalize is not None:
+                raise InvalidParameter(
+                    f"expert_normalize is {self.expert_normalize!r}, but expert is {self.expert}: expected an agent's zip "
+                    "with it."
+                )
             return None
         if Path(self.expert).suffix in (".zip", ".npz") or Path(self.expert).exists():
             return self.expert
@@ -231,13 +238,15 @@ class Arguments:
             return planner_named(name, steps, advantages=advantages, control=control, discrete=discrete)
 
         file, bins = shown.file, self.table.bins
+        named = planner(cast("PlannerName | None", shown.expert)) if file is None else None
+        expert = named if file is None else FromFile.at(file, shown.expert_normalize)
         return Experiment(
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
             bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
-            shown.trust_dataset, shown.after_end,
-            expert=planner(cast("PlannerName | None", shown.expert)) if file is None else FromFile.at(file),
-            epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, inner=planner(self.learning.inner),
-            shaping=self.retraining.shaping, retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
+            shown.trust_dataset,
+            shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner,
+            inner=planner(self.learning.inner), shaping=self.retraining.shaping,
+            retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
         )  # fmt: skip
 
 

@@ -27,11 +27,10 @@ from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.experiment import as_config
 from irl_gym.experts import Acting, load_expert
 from irl_gym.export import Demonstrator
-from irl_gym.given import check_agent, is_file
+from irl_gym.given import check_agent, fingerprint, is_file
 from irl_gym.mdp import check_discount
 from irl_gym.minari_files import spec_json, unkept
 from irl_gym.noise import Noisy, checked_epsilon, noisy
-from irl_gym.own_files import digest
 from irl_gym.planners import SB3, Agent, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.states import StateIndex
@@ -129,6 +128,8 @@ class Recording:
     """That an agent is trained for; None for its default."""
     max_states: int | None = None
     """That an enumeration may find; None for its default."""
+    expert_normalize: str | None = None
+    """Statistics of the observations of an agent in a zip, trained under VecNormalize: the file of its `save`, or an npz."""
 
     def __post_init__(self) -> None:
         check_discount(self.gamma)
@@ -142,14 +143,20 @@ class Recording:
                 f"expert is {self.expert!r}, which is no file: expected one of {', '.join(NAMED)}, or the path of SB3's zip "
                 "or of an npz of actions."
             )
+        if self.expert_normalize is not None and self.expert in NAMED:
+            raise InvalidParameter(
+                f"expert_normalize is {self.expert_normalize!r}, but expert is {self.expert!r}: expected an agent's zip with "
+                "it."
+            )
 
     def plan(self, env: gym.Env) -> dict[str, Any]:
         """Everything that the episodes depend on, as json; a file by its digest, and so what json does not hold."""
         spec = env.spec
         told: Any = repr(env) if spec is None else as_config(spec) if unkept(spec) else json.loads(str(spec_json(spec)))
         found = {**asdict(self), "environment": told}
+        statistics = found.pop("expert_normalize")
         if self.expert not in NAMED:
-            found["expert"] = f"file with sha256 {digest(self.expert)}"
+            found["expert"] = f"file with sha256 {fingerprint(self.expert, statistics)}"
         return found
 
     def metadata(self, env_id: str) -> dict[str, Any]:
@@ -208,7 +215,7 @@ class Recording:
         if table is not None and self.expert == "random":
             return np.full((table.mdp.n_states, table.mdp.n_actions), 1 / table.mdp.n_actions)
         if self.expert not in NAMED:
-            return load_expert(self.expert)
+            return load_expert(self.expert, normalize=self.expert_normalize)
         discrete = isinstance(env.observation_space, spaces.Discrete)
         planner = planner_named(TRAINED[self.expert], self.total_timesteps, control=table is None, discrete=discrete)
         assert isinstance(planner, SB3)

@@ -39,6 +39,7 @@ CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
     nothing.constant_reward,
     weights.flat_weights,
     sampled.inexpressible,
+    truth.blind_expert,
     truth.poor_expert,
     truth.few_episodes,
     truth.unconfirmed,

@@ -147,8 +147,9 @@ def from_data(loop: "Loop") -> bool:
 
 def _recorded(loop: "Loop") -> dict[str, Any]:
     record = loop.stage("demonstrations")
-    lost = {key: record[key] for key in LOST if key in record}
-    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **_known_by(loop), **lost}
+    more = {key: record[key] for key in LOST if key in record}
+    more |= {key: value for key, value in loop.stage("expert").items() if key in TRAINED}
+    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **_known_by(loop), **more}
 
 
 def _known_by(loop: "Loop") -> dict[str, bool]:
@@ -215,6 +216,8 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
+TRAINED = ("trained_return", "vecnormalize")
+"""What `FromFile.trained` says of an expert's training."""
 STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")
 """Lists of states in certificates; the metrics count them."""
 

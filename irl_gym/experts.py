@@ -10,7 +10,7 @@ Axes: S states, A actions, N observations.
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -30,6 +30,7 @@ from irl_gym.features import batch_size, take
 from irl_gym.noise import boltzmann, checked_count, checked_temperature
 from irl_gym.planners import Agent, Algorithm, load_agent
 from irl_gym.policies import Policy, generator, load_actions
+from irl_gym.shown import Training, read_statistics
 from irl_gym.states import States
 
 
@@ -172,7 +173,10 @@ def _categorical(distribution: Any) -> CategoricalDistribution:
 
 
 def load_expert(
-    path: str | os.PathLike, algorithm: Algorithm | None = None, states: States | None = None
+    path: str | os.PathLike,
+    algorithm: Algorithm | None = None,
+    states: States | None = None,
+    normalize: str | os.PathLike | None = None,
 ) -> Agent | np.ndarray:
     """Load an expert: an `Agent` from SB3's zip, or the table that a run left as npz.
 
@@ -183,11 +187,13 @@ def load_expert(
     Args:
         path: the file, of either kind.
         algorithm: who made the zip, "PPO", "DQN" or "A2C"; None to find out. Needed where the settings in it do not tell.
-        states: of the table, for an agent that was trained on its rows.
+        states: of the table, for an agent that was trained on its rows; None for what the file beside its zip says.
+        normalize: statistics of its observations, for an agent that was trained under VecNormalize: the file that its `save`
+            wrote, or an npz; see `irl_gym.shown.read_statistics`.
 
     Raises:
         FileNotFoundError: no such file.
-        InvalidParameter: a file that holds neither, or the agent of another algorithm.
+        InvalidParameter: a file that holds neither, or the agent of another algorithm; statistics that are none of its own.
         InvalidPolicy: a table that is none.
         NotDiscrete: an agent of continuous actions.
     """
@@ -199,6 +205,10 @@ def load_expert(
     except (DamagedFile, OSError) as error:
         raise InvalidParameter(f"{path} holds no expert ({error}): expected SB3's zip of an agent, or an npz.") from error
     if any(name.endswith(".npy") for name in names):
+        if normalize is not None:
+            raise InvalidParameter(
+                f"{path} holds a table of actions: expected an agent's zip beside statistics. Leave them out."
+            )
         return load_actions(path)
     if not isinstance(settings, dict):
         raise InvalidParameter(
@@ -215,7 +225,21 @@ def load_expert(
         raise InvalidParameter(f"{path} holds no {algorithm} agent: expected {maker}, which its settings tell. Name that.")
     agent = load_agent(path, algorithm, states)
     _check_discrete(agent)
-    return agent
+    if normalize is None:
+        return agent
+    normaliser = read_statistics(normalize)
+    normaliser.check(agent.model.observation_space)
+    return replace(agent, normaliser=normaliser)
+
+
+def training_of(path: str | os.PathLike) -> Training:
+    """What an agent's zip says of its training; nothing where it is no such zip."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            settings = json.loads(archive.read("data"))
+    except (OSError, zipfile.BadZipFile, ValueError, RuntimeError, KeyError):
+        return Training()
+    return Training.of(settings) if isinstance(settings, dict) else Training()
 
 
 def _maker(settings: dict[str, Any]) -> Algorithm | None:

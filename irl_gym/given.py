@@ -12,7 +12,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.errors import DatasetMismatch, InvalidParameter, NotTabular
-from irl_gym.experts import load_expert
+from irl_gym.experts import load_expert, training_of
 from irl_gym.own_files import digest
 from irl_gym.planners import Agent, Progress
 from irl_gym.policies import Policy, TabularPolicy, as_distribution
@@ -31,18 +31,32 @@ class FromFile:
     path: str
     """SB3's zip, or an npz with `actions` or `probabilities`."""
     sha256: str | None = None
-    """Of the file, so that a run knows it again; `FromFile.at` fills it in."""
+    """Of the files, so that a run knows them again; `FromFile.at` fills it in."""
+    normalize: str | None = None
+    """Statistics of an agent's observations, where it was trained under VecNormalize: the file of its `save`, or an npz."""
 
     def __post_init__(self) -> None:
         if not is_file(self.path):
             raise InvalidParameter(f"expert is {self.path!r}, which is no file: expected SB3's zip, or an npz of actions.")
-        if self.sha256 is not None and self.sha256 != fingerprint(self.path):
+        if self.normalize is not None and not is_file(self.normalize):
+            raise InvalidParameter(
+                f"normalize is {self.normalize!r}, which is no file: expected what VecNormalize's `save` wrote, or an npz."
+            )
+        if self.sha256 is not None and self.sha256 != fingerprint(self.path, self.normalize):
             raise InvalidParameter(f"{self.path} is not the file that it was (sha256 {self.sha256[:8]}...): expected the same.")
 
     @classmethod
-    def at(cls, path: str) -> "FromFile":
-        """The expert in a file, with the file's digest."""
-        return cls(path, fingerprint(path) if is_file(path) else None)
+    def at(cls, path: str, normalize: str | None = None) -> "FromFile":
+        """The expert in a file, with the digest of all its files."""
+        there = is_file(path) and (normalize is None or is_file(normalize))
+        return cls(path, fingerprint(path, normalize) if there else None, normalize)
+
+    def trained(self) -> dict[str, Any]:
+        """What its zip says of its training: the mean return of its last episodes, and statistics that may be missing here."""
+        training = training_of(self.path)
+        told: dict[str, Any] = {"trained_return": float(np.mean(training.returns))} if training.returns else {}
+        missing = training.normalised and self.normalize is None and not beside(self.path).exists()
+        return told | ({"vecnormalize": True} if missing else {})
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Policy:
         """The policy in the file.
@@ -52,7 +66,7 @@ class FromFile:
             InvalidPolicy: a table of another size.
             NotTabular: a table of actions, where there is no table.
         """
-        found = load_expert(self.path)
+        found = load_expert(self.path, normalize=self.normalize)
         if isinstance(found, Agent):
             return _fitting(found, env)
         if not isinstance(env, TabularVecEnv) or env.states is None:
@@ -73,10 +87,10 @@ def is_file(path: Any) -> bool:
     return isinstance(path, str | os.PathLike) and Path(path).is_file()
 
 
-def fingerprint(path: str) -> str:
-    """The sha256 of a file; where another says what an agent in it is shown, of the digests of both."""
-    shown = beside(path)
-    return hashlib.sha256((digest(path) + digest(shown)).encode()).hexdigest() if shown.is_file() else digest(path)
+def fingerprint(path: str, normalize: str | None = None) -> str:
+    """The sha256 of a file; where others say what an agent in it is shown, of the digests of all."""
+    found = [digest(one) for one in (path, beside(path), normalize) if one is not None and is_file(one)]
+    return found[0] if len(found) == 1 else hashlib.sha256("".join(found).encode()).hexdigest()
 
 
 def _fitting(agent: Agent, env: gym.Env | VecEnv) -> Agent:

@@ -197,7 +197,7 @@ class Loop:
             planner = self.experiment.expert or self.world.expert()
             policy = self.world.train(logged(planner, folder / LOGS / "expert"), None, self._share("expert", planner))
             self.world.keep(policy, folder, "expert", self.experiment.epsilon)
-            made = {"environment_steps": 0} if isinstance(planner, FromFile) else _steps(policy)
+            made = {"environment_steps": 0, **planner.trained()} if isinstance(planner, FromFile) else _steps(policy)
             return {"planner": type(planner).__name__, **made}
         if self.seen is not None:
             np.savez(folder / "expert.npz", actions=most_frequent(self.seen))

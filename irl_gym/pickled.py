@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-MOST_BYTES = 64 << 20
+MOST_BYTES = 8 << 20
 """Of a pickle that is read."""
 
 
@@ -43,7 +43,6 @@ class Call:
         return isinstance(self.maker, Name) and self.maker.name == name and self.maker.module in modules
 
 
-_MARK = object()
 _VALUES = {
     "INT", "BININT", "BININT1", "BININT2", "LONG", "LONG1", "LONG4", "FLOAT", "BINFLOAT", "STRING", "BINSTRING",
     "SHORT_BINSTRING", "UNICODE", "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "BINBYTES", "SHORT_BINBYTES", "BINBYTES8",
@@ -69,16 +68,17 @@ def read_pickle(raw: bytes) -> Any:
             if opcode.name == "STOP":
                 return machine.stack[-1]
             machine.step(opcode.name, argument)
-    except (IndexError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise ValueError(f"it is no pickle of plain data ({type(error).__name__})") from error
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise ValueError(f"it is no pickle of plain data ({type(error).__name__}: {error})") from error
     raise ValueError("it ends before its end")
 
 
 class _Machine:
-    """The stack and the memo."""
+    """The stack, the places of its marks, and the memo."""
 
     def __init__(self) -> None:
         self.stack: list[Any] = []
+        self.marks: list[int] = []
         self.memo: dict[int, Any] = {}
 
     def step(self, name: str, argument: Any) -> None:
@@ -91,7 +91,7 @@ class _Machine:
         elif name.startswith("EMPTY_"):
             stack.append({"EMPTY_LIST": [], "EMPTY_TUPLE": (), "EMPTY_DICT": {}, "EMPTY_SET": []}[name])
         elif name == "MARK":
-            stack.append(_MARK)
+            self.marks.append(len(stack))
         elif name == "POP":
             stack.pop()
         elif name in ("TUPLE", "LIST", "DICT", "FROZENSET"):
@@ -112,8 +112,8 @@ class _Machine:
 
     def _marked(self) -> list[Any]:
         """What stands behind the last mark."""
-        at = len(self.stack) - 1 - self.stack[::-1].index(_MARK)
-        found = self.stack[at + 1 :]
+        at = self.marks.pop()
+        found = self.stack[at:]
         del self.stack[at:]
         return found
 

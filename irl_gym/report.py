@@ -21,6 +21,8 @@ from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged
 from irl_gym.told_rewards import told_of_reward
 
+ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
+"""Findings that say that what was given is not what it seems: they are told at once."""
 COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 """Of a score and a mean return, by how both are judged."""
 
@@ -46,9 +48,13 @@ def render(report: Report) -> Iterator[RenderableType]:
 
 
 def _doctor(report: Report) -> Iterator[RenderableType]:
-    """How much the doctor found; nothing for a healthy run."""
+    """How much the doctor found, and what of it is about the expert that was given; nothing for a healthy run."""
     diagnosis = report.out / "diagnosis.json"
-    count = len(read_json(diagnosis)["findings"]) if diagnosis.exists() else 0
+    findings = read_json(diagnosis)["findings"] if diagnosis.exists() else []
+    count = len(findings)
+    for one in findings:
+        if one.get("name") in ABOUT_THE_GIVEN:
+            yield Text(f"Warning: {one['sentence']} {one['mend']}", "yellow")
     if count:
         things = "1 thing" if count == 1 else f"{count} things"
         yield Text(f"The doctor found {things}: python scripts/doctor.py --run {shlex.quote(str(report.out))}")

@@ -11,6 +11,7 @@ wrote, a pickle, without unpickling it.
 Axes: n states of k numbers.
 """
 
+import base64
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from minari.serialization import serialize_space
 
 from irl_gym.archives import read_arrays
@@ -69,22 +71,28 @@ class Normaliser:
             )
 
     def __call__(self, observation: Any) -> Any:
-        """One observation, or a batch, as the agent was shown it.
-
-        Raises:
-            InvalidParameter: observations of another shape.
-        """
+        """One observation, or a batch, as the agent was shown it."""
         if "" in self.mean:
             return self._of("", observation)
         return {key: self._of(key, one) if key in self.mean else one for key, one in observation.items()}
 
     def _of(self, key: str, raw: Any) -> np.ndarray:
         mean, seen = self.mean[key], np.asarray(raw, dtype=np.float64)
-        if seen.shape[max(0, seen.ndim - mean.ndim) :] != mean.shape:
-            raise InvalidParameter(
-                f"the statistics are of observations {mean.shape}: expected {seen.shape}, as here. Are they another agent's?"
-            )
         return np.clip((seen - mean) / np.sqrt(self.var[key] + self.epsilon), -self.clip, self.clip).astype(np.float32)
+
+    def check(self, space: spaces.Space) -> None:
+        """Check that these are statistics of the observations of an agent.
+
+        Raises:
+            InvalidParameter: they are of others.
+        """
+        parts = space.spaces if isinstance(space, spaces.Dict) else {"": space}
+        for key, mean in self.mean.items():
+            if key not in parts or parts[key].shape != mean.shape:
+                raise InvalidParameter(
+                    f"the statistics are of observations {key or ''}{mean.shape}: expected those of {space}, which the agent "
+                    "was trained on. Are they another agent's?"
+                )
 
     def arrays(self) -> dict[str, np.ndarray]:
         """As a file holds it."""
@@ -198,3 +206,28 @@ def _of_pickle(root: Any) -> Normaliser:
     mean = {str(key): as_numbers(one.state["mean"]).astype(np.float64) for key, one in parts.items()}
     var = {str(key): as_numbers(one.state["var"]).astype(np.float64) for key, one in parts.items()}
     return Normaliser(mean, var, float(as_numbers(state["clip_obs"])), float(as_numbers(state["epsilon"])))
+
+
+@dataclass(frozen=True)
+class Training:
+    """What an agent's zip says of its training, read as data."""
+
+    returns: tuple[float, ...] = ()
+    """Of its last episodes, as Monitor noted them; none where nobody did, and where observations are not normalised."""
+    normalised: bool = False
+    """Is it known that it was under a VecNormalize, which normalises observations, rewards or both? DQN's zip does not say."""
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> "Training":
+        """What the `data` of Stable-Baselines3's zip says; whatever cannot be read as data says nothing."""
+        space = settings.get("observation_space")
+        if not isinstance(space, Mapping) or not str(space.get(":type:", "")).endswith(("box.Box'>", "dict.Dict'>")):
+            return cls()
+        under = settings.get("_last_original_obs") is not None and "replay_buffer_class" not in settings
+        kept = settings.get("ep_info_buffer")
+        try:
+            noted = read_pickle(base64.b64decode(kept[":serialized:"])) if isinstance(kept, Mapping) else None
+            returns = tuple(float(as_numbers(one["r"])) for one in getattr(noted, "items", ()))
+        except (ValueError, KeyError, TypeError):
+            returns = ()
+        return cls(returns, under)

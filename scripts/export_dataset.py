@@ -45,6 +45,8 @@ class Arguments:
     """States that an enumeration may find."""
     expert: str = "value-iteration"
     """value-iteration, on the table; ppo, dqn or a2c, trained here; random; or a file: SB3's zip, or an npz of actions."""
+    expert_normalize: Annotated[str | None, UNSET] = None
+    """Statistics of its observations, of a zip trained under SB3's VecNormalize: the file of its save, or an npz."""
     epsilon: float = 0.0
     """Probability of a uniformly random action in place of the expert's."""
     episodes: Annotated[int | None, UNSET] = None
@@ -74,7 +76,7 @@ def main(arguments: Arguments) -> int:
         )
         recording = Recording(
             arguments.expert, arguments.gamma, arguments.epsilon, arguments.seed, arguments.max_episode_steps,
-            arguments.total_timesteps, arguments.max_states,
+            arguments.total_timesteps, arguments.max_states, arguments.expert_normalize,
         )  # fmt: skip
         keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
         env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)

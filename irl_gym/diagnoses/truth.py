@@ -11,6 +11,8 @@ from irl_gym.dynamic_programming import backup, evaluate_policy, occupancy
 from irl_gym.metrics import policy_value, random_value
 from irl_gym.scores import FEWEST, Scale
 
+BLIND = 0.2
+"""Share of what an expert had over random actions when it was trained; who lacks more may not see what it saw."""
 MUCH = 0.05
 """Share of what can be had over random actions; a loss above it is worth a sentence."""
 
@@ -64,6 +66,26 @@ def _better(case: Case) -> Mend:
         return told, ("--expert value-iteration",)
     told = "More episodes, in which its own actions are the most frequent; less noise (epsilon); or leave out its bad episodes."
     return told, ("--episodes", "--epsilon")
+
+
+def blind_expert(case: Case) -> Finding | None:
+    """An agent that was trained on normalised observations is lost on others: it returns less than its zip says it did then."""
+    told, rows = case.judged.get("demonstrations", {}), case.judged.get("policies") or {}
+    trained, expert, random = told.get("trained_return"), rows.get("expert"), rows.get("random")
+    if trained is None or expert is None or random is None or told.get("episodes_only"):
+        return None
+    high, chance = expert["return_high"], random["mean_return"]
+    if high is None or high >= trained - BLIND * (trained - chance) or trained <= chance:
+        return None
+    under = ", under a VecNormalize whose statistics are not given here" if told.get("vecnormalize") else ""
+    return Finding(
+        "blind-expert",
+        f"The expert returns {expert['mean_return']:.4g} here, but returned {trained:.4g} in the last episodes of its "
+        f"training, by its zip{under}: it may see other observations here, such as ones that were not normalised, or was paid "
+        "another reward then.",
+        "Give the statistics of its observations, the file that VecNormalize's `save` wrote; or an expert of this environment.",
+        flags=("--expert-normalize",),
+    )
 
 
 def few_episodes(case: Case) -> Finding | None:

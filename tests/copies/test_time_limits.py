@@ -105,7 +105,7 @@ class Counts(gym.ObservationWrapper):
 
 
 def test_an_observation_out_of_its_space_names_the_limit_that_was_left_out():
-    with pytest.raises(UnknownObservation, match="Around a TimeLimit of 10 steps.*Counts"):
+    with pytest.raises(UnknownObservation, match=r"Around a TimeLimit of 10 steps.*Counts"):
         Enumeration().table(Counts(limited()), 0.9)
 
 

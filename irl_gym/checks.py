@@ -11,6 +11,8 @@ from irl_gym.errors import InvalidInput, InvalidParameter, IrlGymError, NotDiscr
 
 LARGEST = 1e300
 """Sums of larger numbers overflow."""
+SUM_TOLERANCE, SINGLE_TOLERANCE = 1e-9, 1e-6
+"""How far probabilities may sum up from 1; and those of single precision (float32), which are then divided by their sum."""
 
 
 def checked_number(
@@ -193,3 +195,22 @@ def _made_discrete(space: spaces.Space) -> str:
         bounded = f"{wrappers}.TransformAction(env, lambda action: action, {box})"
         return f"Bound them and take some, such as 5 along each axis, with `{wrappers}.DiscretizeAction({bounded}, 5)`."
     return f"Turn a number into such an action with a function of yours, in `{wrappers}.TransformAction`."
+
+
+def of_single_precision(data: np.ndarray, rows: np.ndarray, n_rows: int) -> tuple[np.ndarray, float]:
+    """Probabilities (nnz,) of rows (nnz,) whose sums are 1 in double precision too, and how far they were from 1.
+
+    Rows that sum to 1 but for the rounding of float32 are divided by their sums, if their numbers are such.
+    """
+    sums = np.bincount(rows, weights=data, minlength=n_rows)
+    off = np.abs(sums - 1)
+    mended = (off > SUM_TOLERANCE) & (off <= SINGLE_TOLERANCE)
+    if not mended.any() or (data[mended[rows]].astype(np.float32) != data[mended[rows]]).any():
+        return data, 0.0
+    return data / np.where(mended, sums, 1.0)[rows], float(off[mended].max())
+
+
+def shown_sum(total: float) -> str:
+    """A sum that is not 1, in enough digits to see it."""
+    told = f"{total:.9g}"
+    return told if told != "1" else f"1 {'+' if total > 1 else '-'} {abs(total - 1):.1g}"

@@ -22,6 +22,7 @@ from gymnasium import spaces
 from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.stripped import without_watchers
+from irl_gym.copies.time_limits import check_limits, check_times
 from irl_gym.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.demonstrations import Episode, stacked
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
@@ -187,6 +188,8 @@ class Interaction:
             NotTabular: the environment cannot be copied, or raises an error.
         """
         space: Any = env.action_space
+        check_times(env)
+        check_limits(env)
         episodes = interact(without_watchers(env), self.steps, seed=self.seed)
         with seeded_globals([self.seed]):
             return self.counting.table(_told(episodes, self.steps, progress), env.observation_space, int(space.n), gamma=gamma)

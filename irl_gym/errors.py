@@ -16,6 +16,8 @@ IrlGymError
 ├── NotDiscrete                a space with infinitely many elements where finitely many are needed
 ├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
 │   ├── HiddenState            one observation that behaves in two ways: it hides part of the state
+│   ├── NotCopied              an environment that cannot be copied, so that nothing can be tried in it
+│   ├── EnvironmentFailed      an environment that raised an error of its own
 │   └── EnumerationLimit       more states, seconds or bytes than an enumeration was allowed
 ├── NotEnumerable              a call with random outcomes that cannot be listed one by one
 ├── NotSettable                an environment that cannot be set to a given state
@@ -106,6 +108,14 @@ class NotEnumerable(IrlGymError):
 
 class HiddenState(NotTabular):
     """One observation that behaves in two ways: it hides part of the state."""
+
+
+class NotCopied(NotTabular):
+    """An environment that cannot be copied, so that nothing can be tried in it."""
+
+
+class EnvironmentFailed(NotTabular):
+    """An environment that raised an error of its own."""
 
 
 class EnumerationLimit(NotTabular):

@@ -235,9 +235,8 @@ def load_expert(
 def training_of(path: str | os.PathLike) -> Training:
     """What an agent's zip says of its training; nothing where it is no such zip."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            settings = json.loads(archive.read("data"))
-    except (OSError, zipfile.BadZipFile, ValueError, RuntimeError, KeyError):
+        _, settings = read_settings(path, "data")
+    except (DamagedFile, OSError):
         return Training()
     return Training.of(settings) if isinstance(settings, dict) else Training()
 

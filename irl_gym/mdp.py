@@ -18,11 +18,10 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import breadth_first_order
 
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
-from irl_gym.checks import any_array, checked_number, float_array, sparse_copy
+from irl_gym.checks import SUM_TOLERANCE, any_array, checked_number, float_array, of_single_precision, shown_sum, sparse_copy
 from irl_gym.errors import InvalidDiscount, InvalidMDP
 from irl_gym.policies import as_distribution, policy_array
 
-ROW_SUM_TOLERANCE = 1e-9
 AS_GOOD_AS_EXACT = 10**9
 """Visits of an exact row in a table of which other rows were counted."""
 
@@ -42,7 +41,10 @@ class TransitionTable:
 
     def __init__(self, P: Any, d0: Any, visits: Any = None):
         self.P: Sparse = _frozen_csr(P)
-        self.d0: Vector = _frozen(float_array("d0", d0, "(S,) probabilities", InvalidMDP))
+        start = float_array("d0", d0, "(S,) probabilities", InvalidMDP)
+        if start.ndim == 1:
+            start = of_single_precision(start, np.zeros(start.size, dtype=np.int64), 1)[0]
+        self.d0: Vector = _frozen(start)
         self.n_states: int = self.P.shape[1]
         _check_start(self.d0, self.n_states)
         if 0 in self.P.shape or self.P.shape[0] % self.n_states:
@@ -192,6 +194,7 @@ def _frozen_csr(P: Any) -> Sparse:
         if P.ndim != 2:
             raise InvalidMDP(f"P has shape {P.shape}: expected (S*A, S). For an (S, A, S) array use `from_dense`.")
     csr: Any = sparse_copy("P", P, InvalidMDP) if sp.issparse(P) else sp.csr_array(P)
+    csr.data = of_single_precision(csr.data, entry_rows(csr), csr.shape[0])[0]
     csr.sum_duplicates()
     csr.eliminate_zeros()
     for part in (csr.data, csr.indices, csr.indptr):
@@ -205,8 +208,10 @@ def _check_start(d0: np.ndarray, n_states: int) -> None:
     wrong = np.flatnonzero(~(d0 >= 0))
     if wrong.size:
         raise InvalidMDP(f"d0[s={wrong[0]}] is {d0[wrong[0]]}: a probability is at least 0.")
-    if not abs(d0.sum() - 1) <= ROW_SUM_TOLERANCE:
-        raise InvalidMDP(f"d0 sums to {d0.sum():.9g}: the distribution of the first state must sum to 1.")
+    if not abs(d0.sum() - 1) <= SUM_TOLERANCE:
+        raise InvalidMDP(
+            f"d0 sums to {shown_sum(d0.sum())}: the distribution of the first state must sum to 1. Divide it by that."
+        )
 
 
 def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
@@ -218,10 +223,13 @@ def _check_rows(P: Sparse, n_states: int, n_actions: int) -> np.ndarray:
         successor, value = P.indices[wrong[0]], P.data[wrong[0]]
         raise InvalidMDP(f"P[s={s}, a={a}, s'={successor}] is {value}: a probability is a number of at least 0.")
     sums = P.sum(axis=1).reshape(n_states, n_actions)
-    wrong = np.argwhere((np.abs(sums - 1) > ROW_SUM_TOLERANCE) & (sums != 0))
+    wrong = np.argwhere((np.abs(sums - 1) > SUM_TOLERANCE) & (sums != 0))
     if wrong.size:
         s, a = wrong[0]
-        raise InvalidMDP(f"P[s={s}, a={a}] sums to {sums[s, a]:.9g}: each row must sum to 1, or to 0 in a terminal state.")
+        mend = " Divide it by its sum." if abs(sums[s, a] - 1) < 1e-3 else ""
+        raise InvalidMDP(
+            f"P[s={s}, a={a}] sums to {shown_sum(sums[s, a])}: each row must sum to 1, or to 0 in a terminal state.{mend}"
+        )
     empty = sums == 0
     mixed = np.flatnonzero(empty.any(axis=1) & ~empty.all(axis=1))
     if mixed.size:

@@ -6,6 +6,7 @@ Minari looks for it. A dataset is written beside its place, its totals last, and
 
 import copy
 import importlib.util
+import inspect
 import json
 import os
 from collections.abc import Callable, Iterable
@@ -13,9 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import minari
 from gymnasium import spaces
-from gymnasium.envs.registration import EnvSpec
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 from minari.dataset.minari_dataset import parse_dataset_id
 from minari.dataset.minari_storage import MinariStorage
 from minari.serialization import serialize_space
@@ -80,6 +82,7 @@ def spec_json(spec: EnvSpec | None) -> str | None:
     if spec is None:
         return None
     named = copy.deepcopy(spec)
+    named.additional_wrappers = tuple(one for one in spec.additional_wrappers if one.name not in WATCHING)  # as `identity`
     for name in ("entry_point", "vector_entry_point"):
         made_by: Any = getattr(named, name)
         if callable(made_by) and "<" not in getattr(made_by, "__qualname__", "<"):
@@ -106,20 +109,34 @@ def unkept(spec: EnvSpec | None) -> str | None:
 
 def identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
     """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
-    if spec is None:
-        return None
-    kwargs = _plain(spec.kwargs)
+    return None if spec is None else _named(spec, _defaults(spec.id) | spec.kwargs)
+
+
+def _named(spec: EnvSpec, arguments: dict[str, Any]) -> tuple[Any, ...]:
+    kwargs = _plain(arguments)
     kwargs.pop("render_mode", None)
     wrappers = [(one.name, one.entry_point, _plain(one.kwargs)) for one in spec.additional_wrappers if one.name not in WATCHING]
     return (spec.id, kwargs, wrappers) if wrappers else (spec.id, kwargs)
 
 
+def _defaults(env_id: str) -> dict[str, Any]:
+    """The arguments that an environment takes where none are given: its constructor's, and those it is registered with."""
+    here = gym.registry.get(env_id)
+    if here is None:
+        return {}
+    try:
+        maker = load_env_creator(here.entry_point) if isinstance(here.entry_point, str) else here.entry_point
+        taken = inspect.signature(maker).parameters if maker is not None else {}
+    except (ImportError, AttributeError, TypeError, ValueError):
+        taken = {}
+    return {name: one.default for name, one in taken.items() if one.default is not one.empty} | here.kwargs
+
+
 def told(spec: EnvSpec | None) -> str:
     """An environment's identity in words: FrozenLake-v1 with map_name='8x8'."""
-    named = identity(spec)
-    if named is None:
+    if spec is None:
         return "an environment without a spec"
-    env_id, kwargs, *more = named
+    env_id, kwargs, *more = _named(spec, spec.kwargs)
     words = [f"{name}={value!r}" for name, value in kwargs.items()]
     words += [f"the wrapper {one[0]}" for wrappers in more for one in wrappers]
     return f"{env_id} with {', '.join(words)}" if words else str(env_id)

@@ -11,7 +11,15 @@ from gymnasium import spaces
 
 from irl_gym.discretize import discretize
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter, NotDiscrete, NotTabular, RunConflict
+from irl_gym.errors import (
+    EnumerationLimit,
+    EnvironmentFailed,
+    HiddenState,
+    InvalidParameter,
+    NotDiscrete,
+    NotTabular,
+    RunConflict,
+)
 from irl_gym.experiment import Experiment
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.table_files import UNDER_WAY, kept_table
@@ -20,8 +28,8 @@ from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
 
 ON_COMMAND_LINE: dict[type[Exception], str] = {
-    HiddenState: "(On the command line: --reveal name=number, --table sample.) ",
-    EnumerationLimit: "(On the command line: --max-states, with --out naming the same folder.) ",
+    HiddenState: "(On the command line: --start-seeds 0, --reveal name=number or name=[value,value], --table sample.)",
+    EnumerationLimit: "(On the command line: --max-states, with --out naming the same folder.)",
 }
 """How the mends of errors are asked for there."""
 
@@ -57,16 +65,26 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
         if not isinstance(env.action_space, spaces.Discrete):
             raise
         if not isinstance(asked.learner, TrajectoryLP):
-            how = ON_COMMAND_LINE.get(type(error), "Or count what random steps do (--table sample). ")
-            how = "For cells give bins; or learn" if "floats" in str(error) else f"{how}Or learn"
-            raise type(error)(
-                f"no table of {asked.env_id or asked.dataset}: {error} {how} from episodes alone, with TrajectoryLP (--learner "
-                "trajectory-lp)."
-            ) from error
+            raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):
             world.check(name, getattr(asked, name))
         return world
+
+
+def _instead(error: NotTabular | NotDiscrete, env: gym.Env) -> str:
+    """What else can be asked for where no table was made: only what does not lead to the same error."""
+    space, kind = env.observation_space, type(error)
+    ways = []
+    if kind in ON_COMMAND_LINE:
+        ways.append(ON_COMMAND_LINE[kind])
+    elif kind is NotTabular:
+        ways.append("Or count what random steps do (--table sample).")
+    elif kind is NotDiscrete and isinstance(space, spaces.Box) and space.dtype.kind == "f":
+        ways.append("Or give bins, for cells (--bins), if its state can be set.")
+    if kind is not EnvironmentFailed and isinstance(space, spaces.Box | spaces.Discrete | spaces.MultiDiscrete):
+        ways.append("Or learn from episodes alone, with TrajectoryLP (--learner trajectory-lp).")
+    return "".join(f" {way}" for way in ways)
 
 
 def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> Tabulation:

@@ -15,7 +15,7 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
 from irl_gym.archives import read_arrays
-from irl_gym.checks import any_array, checked_number
+from irl_gym.checks import any_array, checked_number, of_single_precision, shown_sum
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
 from irl_gym.states import States
 
@@ -94,10 +94,15 @@ def _checked_probabilities(array: np.ndarray) -> np.ndarray:
     if wrong.size:
         s, a = wrong[0]
         raise InvalidPolicy(f"policy[s={s}, a={a}] is {array[s, a]}: a probability is at least 0.")
+    array = array.astype(np.float64)
     sums = array.sum(axis=1)
+    if (np.abs(sums - 1) > 1e-8).any():  # an agent's, perhaps: float32
+        rows = np.repeat(np.arange(len(array)), array.shape[1])
+        array = of_single_precision(array.ravel(), rows, len(array))[0].reshape(array.shape)
+        sums = array.sum(axis=1)
     wrong = np.flatnonzero(np.abs(sums - 1) > 1e-8)
     if wrong.size:
-        raise InvalidPolicy(f"policy[s={wrong[0]}] sums to {sums[wrong[0]]:.9g}: each row must sum to 1. Normalise it.")
+        raise InvalidPolicy(f"policy[s={wrong[0]}] sums to {shown_sum(sums[wrong[0]])}: each row must sum to 1. Normalise it.")
     off = np.abs(sums - 1) > ROUNDING
     return np.where(off[:, None], array / sums[:, None], array).astype(np.float64)
 

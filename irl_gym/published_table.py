@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
-from irl_gym.checks import float_array
+from irl_gym.checks import float_array, of_single_precision
 from irl_gym.errors import InvalidMDP, NotDiscrete, NotTabular
 from irl_gym.states import StateIndex
 from irl_gym.tabulation import Evidence, Lines, Tabulation, from_lines
@@ -49,6 +49,8 @@ class _Entries:
     reward: np.ndarray
     terminated: np.ndarray
     n_actions: int
+    single: float
+    """How far rows of single precision were from 1; they have been divided by their sums."""
 
 
 def _entries(P: Any, space: spaces.Discrete, actions: spaces.Discrete) -> _Entries:
@@ -74,7 +76,8 @@ def _entries(P: Any, space: spaces.Discrete, actions: spaces.Discrete) -> _Entri
         s, a = divmod(int(rows[outside[0]]), n_actions)
         raise InvalidMDP(f"P[s={s}, a={a}] leads to {successor[outside[0]]}: expected a state from 0 to {int(space.n) - 1}.")
     kept = probability != 0
-    return _Entries(rows[kept], probability[kept], successor[kept], reward[kept], terminated[kept], n_actions)
+    probability, single = of_single_precision(probability, rows, int(space.n) * n_actions)
+    return _Entries(rows[kept], probability[kept], successor[kept], reward[kept], terminated[kept], n_actions, single)
 
 
 def _visited(entries: _Entries, d0: np.ndarray) -> np.ndarray:
@@ -119,7 +122,12 @@ def _assemble(entries: _Entries, d0: np.ndarray, space: spaces.Space, gamma: flo
     kept = ~terminal[entries.rows // n_actions]
     lines = Lines(entries.rows[kept], successor[kept], entries.probability[kept], entries.reward[kept])
     evidence = Evidence(
-        method="The table that the environment publishes as P, with terminal rows zeroed and duplicates added up.",
+        method="The table that the environment publishes as P, with terminal rows zeroed and duplicates added up."
+        + (
+            f" Rows of single precision, which summed to 1 within {entries.single:.1g}, were divided by their sums."
+            if entries.single
+            else ""
+        ),
         exact=True, merged=0, split=len(copies), check=None,
     )  # fmt: skip
     start = np.append(d0, np.zeros(len(copies)))

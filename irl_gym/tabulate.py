@@ -22,10 +22,11 @@ from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.closing import close
 from irl_gym.copies.calls import seeded_globals
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotTabular, UnknownEnvironment
+from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
 from irl_gym.fresh_episodes import compare_with_episodes
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
+from irl_gym.observed_integers import as_integers
 from irl_gym.published_model import model_table
 from irl_gym.published_table import published_table
 from irl_gym.reveal import layers
@@ -99,7 +100,12 @@ def tabulate(
         )
     by = by or Enumeration(known=True)
     known = (source(env, gamma) for source in SOURCES) if isinstance(by, Enumeration) and by.known else ()
-    found = next(filter(None, known), None) or by.table(env, gamma, progress)
+    found = next(filter(None, known), None)
+    if found is None:
+        try:
+            found = by.table(env, gamma, progress)
+        except NotDiscrete as error:
+            raise as_integers(env, error) from None
     if check_steps:
         found = replace(found, evidence=replace(found.evidence, check=_checked(env, found, int(check_steps), int(seed))))
     return found if learned is None else _with_reward(found, learned)
@@ -127,6 +133,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
     except (TypeError, KeyError, ValueError) as error:
         if isinstance(error, IrlGymError):
             raise
+        _check_named(env_id, error, kwargs)
         unexpected = re.search(r"unexpected keyword argument '(\w+)'", str(error))
         if unexpected:
             raise InvalidParameter(
@@ -151,6 +158,28 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         raise UnknownEnvironment(
             f"environment {env_id!r} is not registered: expected an id such as 'FrozenLake-v1'.{offer} An environment of "
             "another package needs its module named first, as in 'irl_gym_envs:irl_gym/GridWorld-v0'."
+        ) from error
+
+
+def _check_named(env_id: str, error: Exception, kwargs: dict[str, Any]) -> None:
+    """Name the values that an argument can have, where it was looked for in a dict of the environment's module.
+
+    Raises:
+        InvalidParameter: it was, and is not there.
+    """
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    named = [name for name, value in kwargs.items() if isinstance(error, KeyError) and error.args == (value,)]
+    if last is None or not named:
+        return
+    frame = last.tb_frame
+    known = [frame.f_globals.get(name) for name in frame.f_code.co_names]
+    choices, *more = [one for one in known if isinstance(one, dict) and one and kwargs[named[0]] not in one] or [None]
+    if choices is not None and not more:
+        raise InvalidParameter(
+            f"{named[0]} is {kwargs[named[0]]!r}, which {env_id} does not know: expected one of "
+            f"{', '.join(map(str, [*choices][:20]))}."
         ) from error
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.errors import IrlGymError, NotTabular
+from irl_gym.errors import EnvironmentFailed, IrlGymError
 
 T = TypeVar("T")
 
@@ -22,14 +22,14 @@ def called(run: Callable[[], T]) -> T:
     """What a call of an environment returns; `run` is to hold no more than that call.
 
     Raises:
-        NotTabular: it raised an error of its own.
+        EnvironmentFailed: it raised an error of its own.
     """
     try:
         return run()
     except (IrlGymError, MemoryError):
         raise
     except Exception as error:
-        raise NotTabular(
+        raise EnvironmentFailed(
             f"the environment raised {type(error).__name__} ({error}): expected a reset, and every action in every state, to "
             "work. Mend the environment."
         ) from error
@@ -39,7 +39,7 @@ def stepped(env: gym.Env, action: Any) -> tuple[Any, float, bool, bool]:
     """One step of an environment: observation, reward, terminated, truncated.
 
     Raises:
-        NotTabular: it raised an error, or did not return five values.
+        EnvironmentFailed: it raised an error, or did not return five values.
     """
     return called(lambda: _step(env, action))
 

@@ -73,7 +73,8 @@ def anew(generator: Any) -> NotTabular:
     """The error for a generator that nobody drives."""
     return NotTabular(
         f"the environment made a new {type(generator).__name__} while it ran, whose draws cannot be driven: expected the "
-        "generators that it had after its first reset. Make it in __init__, and anew in reset only when a seed is given."
+        "generators that it had after its first reset. Count what it does instead, with `irl_gym.tabulate(env, gamma=gamma, "
+        "by=irl_gym.counting.Interaction())`; or, in the environment, make it in __init__, and anew in reset only for a seed."
     )
 
 

@@ -14,9 +14,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import TimeLimit
 
 from irl_gym.copies.object_graphs import ATOMS, CODE, Twin, attributes, children
-from irl_gym.errors import NotTabular
+from irl_gym.errors import NotCopied
 from irl_gym.watching import only_watches
 from irl_gym.wrappers import LearnedReward
 
@@ -34,17 +35,22 @@ def layers(env: gym.Env) -> list[gym.Env]:
     return chain
 
 
-def without_watchers(env: gym.Env) -> gym.Env:
+def without_watchers(env: gym.Env, *, limits: bool = False) -> gym.Env:
     """A deep copy of a chain of wrappers without those that only watch or limit it; a LearnedReward is left out too.
 
     Wrappers that change observations, actions or rewards stay. The copy renders nothing: its `render_mode` is None and
     windows are not copied. An unwrapped environment that cannot be copied but has `get_state` and `set_state` is used as
     it is, under copied wrappers.
 
+    Args:
+        env: the chain.
+        limits: keep each TimeLimit.
+
     Raises:
-        NotTabular: an attribute cannot be copied; it is named.
+        NotCopied: an attribute cannot be copied; it is named.
     """
-    return _copied([layer for layer in layers(env) if not _looked_through(layer)], layers(env))
+    kept = [layer for layer in layers(env) if not looked_through(layer) or (limits and isinstance(layer, TimeLimit))]
+    return _copied(kept, layers(env))
 
 
 def duplicate(env: gym.Env) -> gym.Env | None:
@@ -58,7 +64,8 @@ def settable(env: gym.Env) -> bool:
     return all(callable(getattr(env.unwrapped, name, None)) for name in ("get_state", "set_state"))
 
 
-def _looked_through(layer: gym.Env) -> bool:
+def looked_through(layer: gym.Env) -> bool:
+    """Is it a wrapper that only watches, limits or pays a learned reward?"""
     return isinstance(layer, LearnedReward) or (isinstance(layer, gym.Wrapper) and only_watches(layer))
 
 
@@ -72,7 +79,7 @@ def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
             continue
         try:
             current = _copied_layer(layer, memo)
-        except NotTabular:
+        except NotCopied:
             if layer is not chain[-1] or not settable(layer):
                 raise
             memo[id(layer)] = current = layer
@@ -88,7 +95,7 @@ def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
     try:
         for name, value in attributes(layer).items():
             object.__setattr__(made, name, _copied_attribute(layer, name, value, tried))
-    except NotTabular:
+    except NotCopied:
         own = ("__getstate__", "__setstate__", "__reduce__", "__reduce_ex__")
         # EzPickle builds a fresh environment from its arguments: no copy. A class with a way of its own knows better.
         if isinstance(layer, gym.utils.EzPickle) or all(
@@ -107,7 +114,7 @@ def _whole(layer: gym.Env, memo: dict[int, Any]) -> Any:
     except MemoryError:
         raise
     except Exception as error:
-        raise NotTabular(
+        raise NotCopied(
             f"{type(layer).__name__} cannot be copied ({type(error).__name__}: {error}): expected an environment that "
             "copy.deepcopy copies. Give it get_state() and set_state(state), or mend its __deepcopy__."
         ) from error
@@ -129,7 +136,7 @@ def _copied_attribute(layer: gym.Env, name: str, value: Any, memo: dict[int, Any
         if _draws(value):
             return None
         where, culprit = _culprit(value, f"{type(layer).__name__}.{name}", layers(layer))
-        raise NotTabular(
+        raise NotCopied(
             f"{where} is a {type(culprit).__name__}, which cannot be copied ({type(error).__name__}: {error}): expected an "
             f"environment that copy.deepcopy copies. Give {type(layer.unwrapped).__name__} get_state() and set_state(state), "
             "or a __deepcopy__ that leaves this attribute out."

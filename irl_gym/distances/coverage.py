@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices, Numbers
-from irl_gym.checks import float_array
+from irl_gym.checks import float_array, shown_sum
 from irl_gym.errors import InvalidParameter, UndefinedDistance
 from irl_gym.mdp import TabularMDP, checked_mdp, entry_rows
 
@@ -102,5 +102,5 @@ def _check_probabilities(name: str, array: np.ndarray) -> None:
         raise InvalidParameter(f"{name}{wrong[0].tolist()} is {array[tuple(wrong[0])]}: a probability is at least 0.")
     if not abs(array.sum() - 1) <= SUM_TOLERANCE:
         raise InvalidParameter(
-            f"{name} sums to {array.sum():.9g}: expected a distribution, which sums to 1. Divide by the sum."
+            f"{name} sums to {shown_sum(array.sum())}: expected a distribution, which sums to 1. Divide by the sum."
         )

@@ -61,8 +61,10 @@ def _broadcast(shape: tuple[int, ...] | None, *arguments: Any) -> tuple[tuple[in
 
 
 def _chances(p: Any, n: int) -> list[float]:
+    given = np.asarray(p)
     chances = np.asarray(p, dtype=np.float64)
-    if chances.shape != (n,) or not np.all(chances >= 0) or abs(chances.sum() - 1) > 1e-8:
+    near = np.sqrt(np.finfo(given.dtype).eps) if given.dtype.kind == "f" else 1e-8  # NumPy's own tolerance
+    if chances.shape != (n,) or not np.all(chances >= 0) or abs(chances.sum() - 1) > max(near, 1e-8):
         raise Odd("such probabilities")
     return chances.tolist()
 

@@ -22,11 +22,12 @@ from irl_gym.checks import checked_number
 from irl_gym.copies.calls import called
 from irl_gym.copies.snapshots import ConstantChanged
 from irl_gym.copies.stripped import without_watchers
+from irl_gym.copies.time_limits import check_limits, check_times, limited
 from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.outside import OutsideRandomness
-from irl_gym.errors import EnumerationLimit, InvalidParameter
+from irl_gym.errors import EnumerationLimit, InvalidParameter, UnknownObservation
 from irl_gym.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.listed_states import ListedStates, in_order
 from irl_gym.mdp import AS_GOOD_AS_EXACT, TabularMDP
@@ -81,7 +82,9 @@ class Enumeration(Limits):
             EnumerationLimit: more states, seconds or bytes than allowed.
             RunConflict: a checkpoint of something else.
         """
+        check_times(env)
         ranges(env.observation_space)  # refuses floats before anything is copied
+        check_limits(env)
         explored = self._explore(env, progress or (lambda tried, found: None))
         return _assembled(explored, env, gamma, self)
 
@@ -110,6 +113,15 @@ class Enumeration(Limits):
             except ConstantChanged as error:
                 always |= frozenset({error.name})
                 self._forget()
+            except UnknownObservation as error:
+                limit, wrappers = limited(env)
+                if not wrappers:
+                    raise
+                names = ", ".join(type(one).__name__ for one in wrappers)
+                raise UnknownObservation(
+                    f"{error} Around a TimeLimit of {limit} steps, which a table does not have, are: {names}. Leave out what "
+                    "counts on it."
+                ) from error
             except OutsideRandomness as error:
                 outside = error.what
                 self._forget()

@@ -1,0 +1,365 @@
+"""The mends that errors about environments name are executed: what stands between backquotes is evaluated, and serves."""
+
+import re
+
+import gymnasium
+import numpy
+import numpy as np
+import pytest
+from enumeration_envs import Corridor
+from gymnasium import spaces
+from gymnasium.wrappers import StickyAction
+
+from irl_gym.counting import Interaction, interact
+from irl_gym.discretize import discretize
+from irl_gym.enumeration.table import Enumeration
+from irl_gym.errors import (
+    HiddenState,
+    InvalidMDP,
+    InvalidParameter,
+    InvalidPolicy,
+    NotDiscrete,
+    NotTabular,
+    UnknownObservation,
+)
+from irl_gym.mdp import TabularMDP
+from irl_gym.minari_files import identity
+from irl_gym.planners import ValueIteration
+from irl_gym.policies import as_distribution
+from irl_gym.reveal import Reveal
+from irl_gym.seeded_starts import SeededStarts
+from irl_gym.simulator import Simulator
+from irl_gym.tabulate import make, tabulate
+
+pytestmark = pytest.mark.usefixtures("unchecked")
+GAMMA = 0.9
+
+
+def mends(message):
+    """The code that a message names, in its order."""
+    return re.findall(r"`([^`]*)`", message)
+
+
+def done(code, env):
+    """What a mend makes."""
+    import irl_gym.counting
+    import irl_gym.reveal
+    import irl_gym.seeded_starts
+
+    return eval(code, {"env": env, "gamma": GAMMA, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy})
+
+
+def error_of(env, error, **options):
+    with pytest.raises(error) as caught:
+        tabulate(env, gamma=GAMMA, **options)
+    return str(caught.value)
+
+
+def revealed(env):
+    """The environment with all that its errors say to reveal, and their mends where a value was not counted."""
+    shown = {}
+    for _ in range(20):
+        try:
+            tabulate(Reveal(env, shown) if shown else env, gamma=GAMMA, check_steps=500)
+            return Reveal(env, shown)
+        except HiddenState as error:
+            code = next(one for one in mends(str(error)) if one.startswith("irl_gym.reveal.Reveal"))
+            shown |= done(code, env).shown
+        except UnknownObservation as error:
+            more = re.search(r"shown=(\{.*?\})", str(error))
+            if more is None:  # a listed value: "List it too"
+                name, value = re.match(r"(\S+) is (.*?): expected one of", str(error)).groups()
+                shown[name] = [*shown[name], eval(value)]
+            else:
+                shown |= eval(more[1])
+    raise AssertionError("the mends lead nowhere")
+
+
+# --- what is hidden ---
+
+
+class Goal(Corridor):
+    """A goal that each reset draws, of which nothing is shown; a step draws nothing."""
+
+    def reset(self, *, seed=None, options=None):
+        result = super().reset(seed=seed)
+        self.goal_xy = (0, int(self.np_random.integers(4, 7)))
+        return result
+
+    def step(self, action):
+        observation, _, done_, *rest = self.moved(int(action))
+        return observation, float(observation == self.goal_xy[1]), done_, *rest
+
+
+def test_a_goal_that_resets_draw_is_sent_to_seeded_starts_first():
+    env = Goal()
+    message = error_of(env, HiddenState)
+    assert "goal_xy[1]: " in message and mends(message)[0].startswith("irl_gym.seeded_starts.SeededStarts")
+    table = tabulate(done(mends(message)[0], env), gamma=GAMMA)
+    assert table.evidence.exact and table.mdp.n_states == 7
+
+
+def test_a_goal_that_resets_draw_can_be_revealed_as_the_error_spells_it():
+    table = tabulate(revealed(Goal()), gamma=GAMMA)
+    assert table.evidence.exact and table.mdp.n_states > 7
+
+
+class Cached(Corridor):
+    """A flag that matters, behind a memo of what was computed."""
+
+    def __init__(self):
+        super().__init__()
+        self.memo, self.seen, self.flag = {}, [], False
+
+    def reset(self, *, seed=None, options=None):
+        self.flag = False
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        for k in range(44):
+            self.memo[self.cell, k] = k
+        self.seen.append(action)
+        observation, reward, *rest = self.moved(int(action))
+        self.flag = self.flag or self.cell == 0
+        return observation, reward + self.flag, *rest
+
+
+def test_a_difference_that_matters_is_not_buried_under_memos():
+    message = error_of(Cached(), HiddenState)
+    assert re.search(r"Inside, the environment differs in flag: \w+ against \w+ \(\d+ other parts differ, which by", message)
+    assert mends(message)[0] == "irl_gym.reveal.Reveal(env, {'flag': 2})"
+
+
+def test_a_difference_behind_memos_can_be_revealed():
+    assert tabulate(revealed(Cached()), gamma=GAMMA).evidence.exact
+
+
+def test_sticky_actions_are_revealed_though_the_first_is_none():
+    table = tabulate(revealed(StickyAction(Corridor(), 0.25)), gamma=GAMMA)
+    assert table.evidence.exact
+
+
+class Clocked(Corridor):
+    """Pays in the first steps of an episode only."""
+
+    steps = 0
+
+    def reset(self, *, seed=None, options=None):
+        self.steps = 0
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        self.steps = min(self.steps + 1, 5)
+        observation, _, *rest = self.moved(int(action))
+        return observation, float(self.steps < 5), *rest
+
+
+def test_a_counter_can_be_revealed_or_counted_on_average():
+    env = Clocked()
+    message = error_of(env, HiddenState)
+    assert tabulate(revealed(env), gamma=GAMMA).evidence.exact
+    assert not done(mends(message)[-1], env).evidence.exact
+
+
+class Drifts(Corridor):
+    """A number that steps change, and no integer."""
+
+    def reset(self, *, seed=None, options=None):
+        self.drift = 0.0
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        self.drift = min(self.drift + 0.25, 1.0)
+        observation, reward, *rest = self.moved(int(action))
+        return observation, reward + (self.drift > 0.6), *rest
+
+
+def test_a_hidden_float_is_counted_on_average():
+    env = Drifts()
+    message = error_of(env, HiddenState)
+    assert "drift: " in message and not done(mends(message)[-1], env).evidence.exact
+
+
+# --- observations ---
+
+
+class Shows(Corridor):
+    """Shows its cell in some other way."""
+
+    def __init__(self, space, show):
+        super().__init__()
+        self.observation_space, self.show = space, show
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.show(self.cell), {}
+
+    def step(self, action):
+        _, *rest = self.moved(int(action))
+        return self.show(self.cell), *rest
+
+
+WORDS = ["first", "second", "third", "fourth", "fifth", "sixth", "last"]
+SHOWN = {
+    "whole numbers as floats": (spaces.Box(0, 6, (2,), np.float32), lambda cell: np.array([cell, 0], np.float32)),
+    "floats without bounds": (spaces.Box(-np.inf, np.inf, (), np.float64), np.float64),
+    "words": (spaces.Text(6), WORDS.__getitem__),
+    "a dict with a word": (
+        spaces.Dict({"cell": spaces.Discrete(7), "word": spaces.Text(6)}), lambda cell: {"cell": cell, "word": WORDS[cell]}
+    ),
+    "a tuple with a float": (
+        spaces.Tuple([spaces.Box(0, 6, (1,)), spaces.MultiBinary(1)]),
+        lambda cell: (np.array([cell], np.float32), np.zeros(1, np.int8)),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize("by", [None, Interaction(500)], ids=["enumerated", "counted"])
+def test_observations_that_are_whole_numbers_or_words_are_shown_as_integers(name, by):
+    env = Shows(*SHOWN[name])
+    message = error_of(env, NotDiscrete, by=by)
+    assert tabulate(done(mends(message)[0], env), gamma=GAMMA, by=by).mdp.n_states == 7
+
+
+def test_observations_that_are_not_whole_are_sent_to_cells():
+    env = Shows(spaces.Box(0, 6, (1,), np.float64), lambda cell: np.array([cell / 4]))
+    assert mends(error_of(env, NotDiscrete))[0].startswith("discretize(env")
+
+
+# --- actions ---
+
+
+class Does(Corridor):
+    """Is told in some other way where to go."""
+
+    def __init__(self, space, read):
+        super().__init__()
+        self.action_space, self.read, self.state = space, read, None
+
+    def step(self, action):
+        assert self.action_space.contains(action)
+        return self.moved(self.read(action))
+
+
+ACTIONS = {
+    "several": (spaces.MultiDiscrete([2, 3]), lambda a: int(a[0])),
+    "several from others": (spaces.MultiDiscrete([2, 3], start=[-1, 4]), lambda a: int(a[0]) + 1),
+    "a map of several": (spaces.MultiDiscrete([[2, 2], [2, 1]]), lambda a: int(a[0, 1])),
+    "bits": (spaces.MultiBinary(3), lambda a: int(a[1])),
+    "numbers": (spaces.Box(-1, 1, (1,)), lambda a: int(a[0] > 0)),
+    "numbers without bounds": (spaces.Box(-np.inf, np.inf, (2,)), lambda a: int(a[1] > 0)),
+}
+ASKED = {
+    "tabulate": lambda env: tabulate(env, gamma=GAMMA),
+    "interact": lambda env: list(interact(env, 20, seed=0)),
+    "Simulator": lambda env: Simulator(env, ValueIteration(), GAMMA).known,
+}
+
+
+@pytest.mark.parametrize("name", ACTIONS)
+@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.filterwarnings("ignore:.*MultiDiscrete")
+def test_actions_that_are_no_single_number_are_made_one(name, asked):
+    env = Does(*ACTIONS[name])
+    with pytest.raises((NotDiscrete, InvalidParameter), match="expected Discrete") as caught:
+        ASKED[asked](env)
+    assert ASKED[asked](done(mends(str(caught.value))[0], env))
+
+
+def test_actions_that_are_numbered_as_the_error_says_make_a_table_of_cells():
+    env = gymnasium.make("Pendulum-v1")
+    with pytest.raises(NotDiscrete) as caught:
+        discretize(env, gamma=GAMMA, bins=3)
+    assert discretize(done(mends(str(caught.value))[0], env), gamma=GAMMA, bins=3).mdp.n_actions == 5
+
+
+# --- generators, constructors, rows ---
+
+
+class Renewing(Corridor):
+    """Makes a new generator at each reset."""
+
+    def reset(self, *, seed=None, options=None):
+        self.rng = np.random.default_rng(seed)
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        return self.moved(int(action) if self.rng.random() < 0.8 else 1 - int(action))
+
+
+def test_an_environment_that_makes_new_generators_is_counted():
+    env = Renewing()
+    assert done(mends(error_of(env, NotTabular))[0], env).mdp.n_states == 7
+
+
+class Crowded(Corridor):
+    """Each reset draws one of very many first observations."""
+
+    def __init__(self):
+        super().__init__()
+        self.observation_space = spaces.Discrete(10**9)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.cell = int(self.np_random.integers(10**9))
+        return self.cell, {}
+
+    def step(self, action):
+        return self.cell, 0.0, bool(action), False, {}
+
+
+def test_resets_that_cannot_be_listed_are_fixed():
+    env = Crowded()
+    message = error_of(env, NotTabular, by=Enumeration(start_runs=300))
+    assert tabulate(done(mends(message)[0], env), gamma=GAMMA).mdp.n_states == 2
+
+
+def test_a_value_that_a_constructor_does_not_know_is_told_with_those_it_knows():
+    with pytest.raises(InvalidParameter, match=r"map_name is '9x9', which FrozenLake-v1 does not know: expected") as caught:
+        make("FrozenLake-v1", map_name="9x9")
+    for name in re.search(r"one of (.*)\.", str(caught.value))[1].split(", "):
+        make("FrozenLake-v1", map_name=name).close()
+
+
+def test_an_argument_that_is_spelled_out_or_left_out_is_the_same_environment():
+    specs = [gymnasium.make("FrozenLake-v1", **given).spec for given in ({}, {"is_slippery": True}, {"map_name": "4x4"})]
+    other = gymnasium.make("FrozenLake-v1", is_slippery=False).spec
+    assert identity(specs[0]) == identity(specs[1]) == identity(specs[2]) != identity(other)
+
+
+THIRDS = np.full((3, 3), np.float32(1 / 3))
+
+
+@pytest.mark.parametrize("P", [THIRDS, THIRDS.astype(np.float64)], ids=["float32", "as float64"])
+def test_rows_of_single_precision_are_taken_and_sum_to_1(P):
+    mdp = TabularMDP(P, GAMMA, np.full(3, np.float32(1 / 3)))
+    assert np.abs(mdp.P.sum(axis=1) - 1).max() < 1e-15 and abs(mdp.d0.sum() - 1) < 1e-15
+
+
+def test_rows_of_a_policy_of_single_precision_are_taken():
+    assert np.abs(as_distribution(THIRDS, 3, 3).sum(axis=1) - 1).max() < 1e-15
+
+
+def test_a_published_table_of_single_precision_is_taken_and_its_evidence_says_so():
+    env = gymnasium.make("FrozenLake-v1")
+    base = env.unwrapped
+    base.P = {s: {a: [(np.float32(p), *rest) for p, *rest in base.P[s][a]] for a in base.P[s]} for s in base.P}
+    table = tabulate(env, gamma=GAMMA)
+    assert "Rows of single precision, which summed to 1 within 3e-08, were divided by their sums." in table.evidence.method
+    assert "single" not in tabulate(gymnasium.make("FrozenLake-v1"), gamma=GAMMA).evidence.method
+
+
+def test_a_row_that_is_nearly_1_is_told_by_how_much_and_mended_by_its_sum():
+    P = np.eye(3) * (1 + 1e-7)
+    with pytest.raises(InvalidMDP, match=r"sums to 1\.0000001: each row must sum to 1.*Divide it by its sum"):
+        TabularMDP(P, GAMMA, np.eye(3)[0])
+    assert TabularMDP(P / P.sum(axis=1, keepdims=True), GAMMA, np.eye(3)[0]).n_states == 3
+    with pytest.raises(InvalidMDP, match=r"sums to 1 \+ 2e-10|sums to 1 \+ 4e-09"):
+        TabularMDP(np.eye(3) * (1 + 4e-9) * np.float64(1), GAMMA, np.eye(3)[0])
+    with pytest.raises(InvalidPolicy, match=r"sums to 1\.0000001"):
+        as_distribution(P, 3, 3)
+
+
+def test_the_layouts_of_one_seed_are_one():
+    assert tabulate(SeededStarts(Goal(), (0,)), gamma=GAMMA).evidence.exact

@@ -198,7 +198,7 @@ def _kept(states: Any) -> TypeGuard[StateIndex | ListedStates | Cells]:
     return known or isinstance(states, StateIndex | ListedStates)
 
 
-def _of_cells(cells: Cells) -> dict[str, np.ndarray]:
+def _of_cells(cells: Cells) -> dict[str, Any]:
     """What a file holds of a grid, but for its terminal copies and its space."""
     shown = cells.coordinates
     arrays = {"names": np.array(shown.names), "low": shown.low, "high": shown.high, "periodic": shown.periodic}

@@ -37,6 +37,8 @@ CALLED = (*PARTS, "function")
 """Entries that are never text: a text there is the name of a function."""
 WRITTEN = {"values": "np.array({})", "centres": "np.array({})", "sigma": "np.array({})", "shape": "tuple({})"}
 """Fields whose lists were something else, and how that is made of them."""
+ASKED = frozenset(Experiment.__dataclass_fields__)
+"""Entries that are written as Python; any other key is none of an experiment's, and could be any text."""
 NOT_HERE = "..."
 """In place of what a configuration does not hold; Python reads it as a value."""
 
@@ -74,7 +76,7 @@ def python_lines(config: Mapping[str, Any]) -> str:
     told = [
         f"    {key}={_python(key, value, used)},"
         for key, value in config.items()
-        if key in ("env_id", "gamma") or (value is not None and value != plain.get(key, MISSING))
+        if key in ASKED and (key in ("env_id", "gamma") or (value is not None and value != plain.get(key, MISSING)))
     ]
     imports = sorted(f"from {KINDS[name].__module__} import {name}" for name in used)
     if any("np.array(" in line for line in told):
@@ -120,7 +122,7 @@ def _python(key: str, value: Any, used: set[str]) -> str:
         told = (
             f"{name}={_python(name, one, used)}"
             for name, one in value.items()
-            if name != "type" and one != own.get(name, MISSING)
+            if name.isidentifier() and name != "type" and one != own.get(name, MISSING)
         )
         return f"{value['type']}({', '.join(told)})"
     if isinstance(value, Mapping) and value.get("float") in ("inf", "-inf", "nan"):

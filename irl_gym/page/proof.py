@@ -146,9 +146,7 @@ def _counted(run: Run) -> str:
 def certificate(run: Run) -> Section:
     """What the learned reward proves, line by line, and the raw numbers behind it."""
     raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
-    lead = (
-        "The run's record, which it computed from the table, the expert and the reward alone, not taken from the solver's word."
-    )
+    lead = "The run's record, which it computed from the table, the expert and the reward alone, not taken from the solver."
     if run.recomputed:
         lead = (
             "Whether the expert is optimal was computed again for this page, from the table, the expert and the reward in the "

@@ -92,3 +92,15 @@ def test_a_run_from_python_says_so(tmp_path):
 def test_a_run_of_an_earlier_version_does_not_say_that_it_was_started_from_python(tmp_path):
     lead = reproduce(replace(stepped_run(tmp_path), version={})).lead
     assert "started from Python" not in lead and "An earlier version of irl_gym made the run" in lead
+
+
+def test_keys_of_a_strangers_configuration_are_not_written_as_python():
+    config = Experiment("X-v0", 0.9, learner=FiniteLP(l1=2.0)).to_json()
+    config = {"x=print(1) or 1, y": 2, **config, "learner": {**config["learner"], "l1=print(1), r_max": 3}}
+    assert "print" not in python_lines(config) and "l1=2.0" in python_lines(config)
+
+
+def test_a_command_of_another_program_is_shown_as_one(tmp_path):
+    run = stepped_run(tmp_path)
+    theirs = replace(run, version={**run.version, "command": ["rm", "-rf", "all"]})
+    assert "another program than irl_gym" in reproduce(theirs).lead and "another program" not in reproduce(run).lead

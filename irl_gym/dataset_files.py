@@ -5,7 +5,7 @@
     data/N/part-0.arrow, data/N/metadata.json    a folder an episode
 
 Minari believes them: counts become arrays, links are followed, and where a space is missing it makes whatever environment the
-file names. Numbers in Arrow may point outside of their file; its own check is made first.
+file names.
 """
 
 import json
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.archives import check_declared
+from irl_gym.arrow_files import check_arrow, check_parquet
 from irl_gym.errors import DamagedFile
 from irl_gym.hdf5_files import check_hdf5
 from irl_gym.told_spaces import told_space
@@ -77,7 +77,7 @@ def check_episodes(folder: Path, data_format: str, numbers: Iterator[int]) -> No
         for one in sorted((folder / str(number)).iterdir()):
             inside(folder, one)
             if one.name != "metadata.json" and not one.name.startswith(("_", ".")):
-                _check_table(one, data_format)
+                (check_parquet if data_format == "parquet" else check_arrow)(one)
 
 
 def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.Space, actions: Any) -> None:
@@ -158,23 +158,3 @@ def _check_spec(name: str, told: Any) -> None:
         raise DamagedFile(f"its {name} is no json: {str(error)[:200]}") from error
     if not isinstance(spec, dict) or not isinstance(spec.get("id"), str) or not isinstance(spec.get("kwargs", {}), dict):
         raise DamagedFile(f"its {name} is {told!r:.80}, and no spec of an environment")
-
-
-def _check_table(path: Path, data_format: str) -> None:
-    """Check a file of Arrow's."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        if data_format == "parquet":
-            about = pq.read_metadata(path)
-            check_declared(sum(about.row_group(i).total_byte_size for i in range(about.num_row_groups)), path.stat().st_size)
-            check_declared(8 * about.num_rows * about.num_columns, path.stat().st_size)
-            return
-        with pa.memory_map(str(path)) as file, pa.ipc.open_file(file) as batches:
-            for i in range(batches.num_record_batches):
-                batches.get_batch(i).validate(full=True)
-    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, MemoryError) as error:
-        if isinstance(error, DamagedFile):
-            raise
-        raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from minari.dataset.minari_dataset import parse_dataset_id
 
 from irl_gym.arrow_files import check_arrow, check_parquet
 from irl_gym.errors import DamagedFile
@@ -37,12 +38,14 @@ def check_told(folder: Path) -> None:
     Raises:
         OSError: a file that is not there, or cannot be opened.
         DamagedFile: one that says what no dataset does, or leads out of the folder.
+        ValueError, TypeError: Minari's, of a malformed id.
     """
     inside(folder, folder / "metadata.json")
     told = read_told(folder / "metadata.json")
     for name in _TEXTS:
         if not isinstance(told.get(name), str):
             raise DamagedFile(f"its metadata have the {name} {told.get(name)!r:.80}, which is no text")
+    parse_dataset_id(told["dataset_id"])
     for name in ("observation_space", "action_space"):
         told_space(name, told.get(name))
     for name in ("env_spec", "eval_env_spec"):
@@ -92,9 +95,10 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
     wrong = np.flatnonzero((taken < int(actions.start)) | (taken > int(actions.start) + int(actions.n) - 1))
     if wrong.size:
         raise DamagedFile(f"{here}, step {wrong[0]} has action {taken[wrong[0]]}, which is not of {actions}")
-    rewards = np.asarray(episode.rewards)
-    if rewards.dtype.kind not in "biuf" or rewards.ndim != 1:
-        raise DamagedFile(f"{here} has rewards of shape {rewards.shape} and dtype {rewards.dtype}, and no numbers (T,)")
+    for name in ("rewards", "terminations", "truncations"):
+        one = np.asarray(getattr(episode, name))
+        if one.dtype.kind not in "biuf" or one.ndim != 1:
+            raise DamagedFile(f"{here} has {name} of shape {one.shape} and dtype {one.dtype}, and no numbers (T,)")
     seed = metadata.get("seed")
     if seed is not None and (type(seed) is not int or seed < 0):
         raise DamagedFile(f"{here} has the seed {seed!r:.80}, and no whole number of at least 0")
@@ -104,11 +108,12 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
 def _check_observed(here: str, found: Any, space: Any) -> None:
     """Check observations part by part: of the space's shape, numbers where it has numbers, and none that is NaN."""
     if isinstance(space, spaces.Dict | spaces.Tuple):
+        parts: Any = space.spaces
         keys = list(space.spaces) if isinstance(space, spaces.Dict) else range(len(space.spaces))
         if len(found) != len(keys):
             raise DamagedFile(f"{here} has observations of {len(found)} parts: expected {len(keys)}, as {space} has")
         for key in keys:
-            _check_observed(here, found[key], space.spaces[key])
+            _check_observed(here, found[key], parts[key])
         return
     array, text = np.asarray(found), isinstance(space, spaces.Text)
     kinds = "UO" if text else "biuf" if np.dtype(space.dtype).kind == "f" else "biu"

@@ -218,7 +218,7 @@ def read_minari(
     for episode, metadata in _stored(dataset):
         here = f"dataset {dataset.spec.dataset_id!r}, episode {episode.id}"
         rewards = np.asarray(episode.rewards, float)
-        if not len(episode.actions) or not len(episode.terminations):
+        if not (len(episode.actions) and len(episode.terminations) and len(episode.truncations)):
             raise InvalidDemonstrations(f"{here} has no steps: expected at least one. Leave it out.")
         wrong = np.flatnonzero(~np.isfinite(rewards))
         if wrong.size:

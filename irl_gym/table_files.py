@@ -131,7 +131,7 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, evidence: Any) -
     rows, copies = (mdp.n_states, mdp.n_actions), found["copies"]
     reward = TabularReward(found["reward"], {"source": "environment"})
     entries = found["entries"] if found["entries"].size else None
-    shapes = {"reward": rows, "mean": rows, "deviation": rows, "copies": (copies.size // 2, 2)}
+    shapes: dict[str, tuple[int, ...]] = {"reward": rows, "mean": rows, "deviation": rows, "copies": (copies.size // 2, 2)}
     if entries is not None:
         shapes["entries"] = (mdp.P.nnz,)
     for name, shape in shapes.items():

@@ -156,6 +156,8 @@ def _members(path: str | os.PathLike, archive: zipfile.ZipFile) -> dict[str, zip
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
     """One array: its header is compared with what the zip declares before anything is allocated."""
+    file: Any
+    data: Any
     with archive.open(info) as file:
         version = npy.read_magic(file)
         if version not in _HEADERS:

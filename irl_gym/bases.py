@@ -45,6 +45,7 @@ class RadialBasis:
             raise InvalidFeatures(
                 f"sigma is {sigma.tolist()}: expected a width above 0 for each of {centres.shape[1]} coordinates."
             )
+        _check_callable(self.coordinates)
         object.__setattr__(self, "centres", centres)
         object.__setattr__(self, "sigma", np.broadcast_to(sigma, centres.shape[1:]).copy())
 
@@ -122,6 +123,7 @@ class Fourier:
 
     def __post_init__(self) -> None:
         low, _ = _bounds(self.low, self.high)
+        _check_callable(self.coordinates)
         _order(self.order)
         _check_count((int(self.order) + 1) ** min(low.size, 20))  # 2^20 are too many already
 
@@ -168,6 +170,7 @@ class Polynomial:
 
     def __post_init__(self) -> None:
         low, _ = _bounds(self.low, self.high)
+        _check_callable(self.coordinates)
         _order(self.degree)
         _check_count(comb(low.size + int(self.degree), min(low.size, int(self.degree), 20)))  # of (40 over 20), too
 
@@ -224,6 +227,11 @@ def _span(low: Any, high: Any) -> str:
 
 def _order(order: Any) -> None:
     checked_number("the order", order, "a whole number of at least 0", least=0, whole=True, error=InvalidFeatures)
+
+
+def _check_callable(coordinates: Any) -> None:
+    if coordinates is not None and not callable(coordinates):
+        raise InvalidFeatures(f"coordinates is {coordinates!r:.80}: expected a function of observations, or None.")
 
 
 def _check_count(count: int) -> None:

@@ -122,7 +122,7 @@ def sparse_copy(name: str, matrix: Any, error: type[InvalidInput]) -> sp.csr_arr
         _check_parts(matrix.data.reshape(len(matrix.data), -1)[:, 0], matrix.indices, matrix.indptr, shape, name, error)
     elif matrix.format == "csr":
         _check_parts(matrix.data, matrix.indices, matrix.indptr, matrix.shape, name, error)
-    csr = sp.csr_array(matrix, copy=True)
+    csr: Any = sp.csr_array(matrix, copy=True)
     if matrix.format not in ("csr", "csc", "bsr", "coo"):  # lists, dictionaries and diagonals
         _check_parts(csr.data, csr.indices, csr.indptr, csr.shape, name, error)
     return csr.astype(np.float64, copy=False)

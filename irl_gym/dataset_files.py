@@ -5,7 +5,7 @@
     data/N/part-0.arrow, data/N/metadata.json    a folder an episode
 
 Minari believes them: counts become arrays, links are followed, and where a space is missing it makes whatever environment the
-file names. Numbers in Arrow may point outside of their file; its own check is made first.
+file names.
 """
 
 import json
@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from minari.dataset.minari_dataset import parse_dataset_id
 
-from irl_gym.archives import check_declared
+from irl_gym.arrow_files import check_arrow, check_parquet
 from irl_gym.errors import DamagedFile
 from irl_gym.hdf5_files import check_hdf5
 from irl_gym.told_spaces import told_space
@@ -37,12 +38,14 @@ def check_told(folder: Path) -> None:
     Raises:
         OSError: a file that is not there, or cannot be opened.
         DamagedFile: one that says what no dataset does, or leads out of the folder.
+        ValueError, TypeError: Minari's, of a malformed id.
     """
     inside(folder, folder / "metadata.json")
     told = read_told(folder / "metadata.json")
     for name in _TEXTS:
         if not isinstance(told.get(name), str):
             raise DamagedFile(f"its metadata have the {name} {told.get(name)!r:.80}, which is no text")
+    parse_dataset_id(told["dataset_id"])
     for name in ("observation_space", "action_space"):
         told_space(name, told.get(name))
     for name in ("env_spec", "eval_env_spec"):
@@ -77,7 +80,7 @@ def check_episodes(folder: Path, data_format: str, numbers: Iterator[int]) -> No
         for one in sorted((folder / str(number)).iterdir()):
             inside(folder, one)
             if one.name != "metadata.json" and not one.name.startswith(("_", ".")):
-                _check_table(one, data_format)
+                (check_parquet if data_format == "parquet" else check_arrow)(one)
 
 
 def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.Space, actions: Any) -> None:
@@ -92,9 +95,10 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
     wrong = np.flatnonzero((taken < int(actions.start)) | (taken > int(actions.start) + int(actions.n) - 1))
     if wrong.size:
         raise DamagedFile(f"{here}, step {wrong[0]} has action {taken[wrong[0]]}, which is not of {actions}")
-    rewards = np.asarray(episode.rewards)
-    if rewards.dtype.kind not in "biuf" or rewards.ndim != 1:
-        raise DamagedFile(f"{here} has rewards of shape {rewards.shape} and dtype {rewards.dtype}, and no numbers (T,)")
+    for name in ("rewards", "terminations", "truncations"):
+        one = np.asarray(getattr(episode, name))
+        if one.dtype.kind not in "biuf" or one.ndim != 1:
+            raise DamagedFile(f"{here} has {name} of shape {one.shape} and dtype {one.dtype}, and no numbers (T,)")
     seed = metadata.get("seed")
     if seed is not None and (type(seed) is not int or seed < 0):
         raise DamagedFile(f"{here} has the seed {seed!r:.80}, and no whole number of at least 0")
@@ -104,11 +108,12 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
 def _check_observed(here: str, found: Any, space: Any) -> None:
     """Check observations part by part: of the space's shape, numbers where it has numbers, and none that is NaN."""
     if isinstance(space, spaces.Dict | spaces.Tuple):
+        parts: Any = space.spaces
         keys = list(space.spaces) if isinstance(space, spaces.Dict) else range(len(space.spaces))
         if len(found) != len(keys):
             raise DamagedFile(f"{here} has observations of {len(found)} parts: expected {len(keys)}, as {space} has")
         for key in keys:
-            _check_observed(here, found[key], space.spaces[key])
+            _check_observed(here, found[key], parts[key])
         return
     array, text = np.asarray(found), isinstance(space, spaces.Text)
     kinds = "UO" if text else "biuf" if np.dtype(space.dtype).kind == "f" else "biu"
@@ -158,23 +163,3 @@ def _check_spec(name: str, told: Any) -> None:
         raise DamagedFile(f"its {name} is no json: {str(error)[:200]}") from error
     if not isinstance(spec, dict) or not isinstance(spec.get("id"), str) or not isinstance(spec.get("kwargs", {}), dict):
         raise DamagedFile(f"its {name} is {told!r:.80}, and no spec of an environment")
-
-
-def _check_table(path: Path, data_format: str) -> None:
-    """Check a file of Arrow's."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        if data_format == "parquet":
-            about = pq.read_metadata(path)
-            check_declared(sum(about.row_group(i).total_byte_size for i in range(about.num_row_groups)), path.stat().st_size)
-            check_declared(8 * about.num_rows * about.num_columns, path.stat().st_size)
-            return
-        with pa.memory_map(str(path)) as file, pa.ipc.open_file(file) as batches:
-            for i in range(batches.num_record_batches):
-                batches.get_batch(i).validate(full=True)
-    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, MemoryError) as error:
-        if isinstance(error, DamagedFile):
-            raise
-        raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error

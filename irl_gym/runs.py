@@ -279,6 +279,14 @@ def _check_shapes(run: Run, reader: _Reader) -> None:
                 f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; delete it, and its stage is "
                 "run again"
             )
+    for name, policy in (("expert.npz", run.expert), ("agent_policy.npz", run.agent)):
+        if policy is not None and policy.ndim == 1 and policy.max(initial=0) >= shape[1]:
+            what = f"{name} has action {policy.max()} of {shape[1]}"
+            raise reader.incomplete(f"{what}; delete it, and its stage is run again")
+    for name, width in (run.widths or {}).items():
+        if np.shape(width) not in (shape, shape[:1]):
+            what = f"ambiguity.npz has widths.{name} of shape {np.shape(width)} for {shape[0]} states"
+            raise reader.incomplete(f"{what}; delete it, and its stage is run again")
 
 
 def _with_proof(run: Run, reader: _Reader) -> Run:

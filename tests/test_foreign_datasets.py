@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from irl_gym import archives
+from irl_gym.arrow_files import check_arrow
 from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import DamagedFile, InvalidDemonstrations
 from irl_gym.hdf5_files import DEEPEST, check_hdf5
-from irl_gym.imports import from_d4rl
+from irl_gym.imports import from_d4rl, from_frame
 from irl_gym.told_spaces import told_space
 
 ID = "lake-v0"
@@ -265,6 +266,40 @@ def test_arrow_whose_places_lead_outside_is_refused(arrow):
     (folder / "part-0.arrow").write_bytes((folder / "part-0.arrow").read_bytes().replace(places, outside))
     with pytest.raises(InvalidDemonstrations, match=r"part-0\.arrow is damaged"):
         next(read_minari(ID, root=root))
+
+
+@pytest.mark.parametrize("packing", ["zstd", "lz4"])
+def test_arrow_that_declares_more_than_it_can_hold_is_refused_before_it_is_unpacked(arrow, monkeypatch, packing):
+    import pyarrow as pa
+
+    root, folder = arrow
+    batch = pa.RecordBatch.from_arrays([pa.array(np.zeros(1_000_000))], names=["observations"])
+    options = pa.ipc.IpcWriteOptions(compression=packing)
+    with pa.OSFile(str(folder / "part-0.arrow"), "wb") as file, pa.ipc.new_file(file, batch.schema, options=options) as writer:
+        writer.write_batch(batch)
+    monkeypatch.setattr(archives, "FREE", 1 << 10)
+    with pytest.raises(InvalidDemonstrations, match="declares 8,000,000: expected at most"):
+        next(read_minari(ID, root=root))
+
+
+def test_packed_arrow_in_proportion_is_no_damage(tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    words = pa.array(["a", "b"] * 50).dictionary_encode()
+    batch = pa.RecordBatch.from_arrays([words, pa.array(range(100))], names=["words", "numbers"])
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.OSFile(str(tmp_path / "a.arrow"), "wb") as file, pa.ipc.new_file(file, batch.schema, options=options) as writer:
+        writer.write_batch(batch)
+    check_arrow(tmp_path / "a.arrow")
+
+
+def test_parquet_that_declares_more_than_it_can_hold_is_refused(tmp_path, monkeypatch):
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"observation": np.zeros(100_000, int), "action": np.zeros(100_000, int)}), tmp_path / "a.parquet")
+    monkeypatch.setattr(archives, "FREE", 1 << 10)
+    with pytest.raises(InvalidDemonstrations, match="declares 1,600,000: expected at most"):
+        from_frame(tmp_path / "a.parquet", episode=None, step=None, space=gym.spaces.Discrete(2), n_actions=2)
 
 
 @pytest.mark.parametrize(

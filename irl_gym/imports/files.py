@@ -12,7 +12,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from irl_gym.arrow_files import check_parquet
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter, NotInstalled
+from irl_gym.hdf5_files import BROKEN
 from irl_gym.imports.values import Name, shown
 
 SEPARATORS = {".csv": ",", ".tsv": "\t"}
@@ -56,24 +58,27 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
         raise DatasetMissing(f"{path} is not a file: expected one with the demonstrations.")
     try:
         if kind in PARQUET:
-            return _read_parquet(pd, path, columns, optional)
+            return _read_parquet(path, columns, optional)
         return _read_text(pd, path, SEPARATORS[kind], columns, optional)
     except ImportError as error:
         raise NotInstalled('Parquet files need pyarrow, which is missing: expected it. pip install "irl_gym[data]".') from error
     except InvalidDemonstrations:
         raise
-    except (ValueError, OSError, csv.Error, pd.errors.ParserWarning) as error:
+    except (*BROKEN, csv.Error, pd.errors.ParserWarning) as error:
         reason = " ".join(str(error).split())
         raise InvalidDemonstrations(f"{path.name} cannot be read ({reason}): expected {kind} with a header.") from error
 
 
-def _read_parquet(pd: Any, path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
+def _read_parquet(path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
     import pyarrow.parquet
 
+    check_parquet(path)
     there = pyarrow.parquet.read_schema(path).names
     _check_columns(path.name, there, columns, optional)
     wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
-    return pd.read_parquet(path, columns=wanted), lambda row: f"row {row + 1} of {path.name}"
+    table = pyarrow.parquet.read_table(path, columns=wanted)
+    table.validate(full=True)
+    return table.to_pandas(ignore_metadata=True), lambda row: f"row {row + 1} of {path.name}"
 
 
 def _read_text(pd: Any, path: Path, separator: str, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:

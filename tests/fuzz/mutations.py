@@ -178,8 +178,8 @@ def of_hdf5(path, change):
             )
             try:
                 held.attrs[change.pick(attributes)] = value
-            except (TypeError, ValueError, OverflowError, OSError):
-                del held.attrs[change.pick(attributes)]
+            except (TypeError, ValueError, OverflowError, OSError):  # h5py writes no such value, and may have deleted the old
+                held.attrs[change.pick(attributes)] = -1
             return
         array = held[()] if isinstance(held, h5py.Dataset) and held.dtype.kind in "biuf" else np.arange(3)
         del file[name]

@@ -48,7 +48,7 @@ class Reader:
     """Which of them are changed."""
     documented: tuple[type[Exception], ...] = ()
     """Errors that are none of the library's, and which it says that it raises."""
-    weight: int = 1
+    weight: float = 1
     """Share of the inputs."""
 
 
@@ -261,8 +261,8 @@ READERS = {
     "Minari, Arrow": Reader(write_dataset("arrow"), read_dataset, "lake-v0/data/**/*", weight=2),
     "D4RL": Reader(write_d4rl, read_d4rl),
     "frames": Reader(write_frames, read_frames, weight=2),
-    "run": Reader(lambda folder: None, sound_run, "**/*", weight=3),
-    "page of a run": Reader(lambda folder: None, read_page, "*.*"),
+    "run": Reader(lambda folder: None, sound_run, "**/*", weight=2),
+    "page of a run": Reader(lambda folder: None, read_page, "*.*", weight=0.1),
     "resumed run": Reader(lambda folder: None, read_folder, "**/*"),
 }
 """By what they read. A run is made once for all tests, and copied."""

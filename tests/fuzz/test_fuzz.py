@@ -72,15 +72,19 @@ def fuzz(name, finished, folder, inputs):
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_a_changed_file_is_refused_by_an_error_of_ours_or_read_as_something_sound(name, finished, tmp_path, no_agent):
-    fuzz(name, finished, tmp_path, SMALL * READERS[name].weight // TOTAL)
+def test_a_changed_file_is_refused_by_an_error_of_ours_or_read_as_something_sound(
+    name, finished, tmp_path, no_agent, unchecked
+):
+    fuzz(name, finished, tmp_path, int(SMALL * READERS[name].weight / TOTAL))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
-def test_each_of_100_000_inputs_is_refused_by_an_error_of_ours_or_read_as_something_sound(name, finished, tmp_path, no_agent):
+def test_each_of_100_000_inputs_is_refused_by_an_error_of_ours_or_read_as_something_sound(
+    name, finished, tmp_path, no_agent, unchecked
+):
     forget_peak()
-    fuzz(name, finished, tmp_path, MANY * READERS[name].weight // TOTAL)
+    fuzz(name, finished, tmp_path, int(MANY * READERS[name].weight / TOTAL))
     assert peak() < 1e9
 
 

@@ -1,0 +1,105 @@
+"""Arrow and Parquet files from anybody, looked through before they are read.
+
+Arrow believes what a file says of its own buffers: numbers may point outside of it, and a few kilobytes may unpack to any size.
+So sizes are added up from the messages without unpacking one, and then Arrow's own full check is made. A message of Arrow's is
+a flatbuffer; what is read of it here are its buffers, each with a place in the body of the message, and where they are packed,
+the size of each before that, which stands in its first 8 bytes (Arrow's format, "Body compression").
+"""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+from irl_gym.archives import check_declared
+from irl_gym.errors import DamagedFile
+from irl_gym.hdf5_files import BROKEN
+
+_MAGIC = 8
+"""Bytes before the first message."""
+_HEADER, _BUFFERS, _COMPRESSION = 2, 2, 3
+"""Which fields of a message, and of the batch that is its header."""
+
+
+def check_arrow(path: Path) -> None:
+    """Look through a file of record batches.
+
+    Raises:
+        DamagedFile: it is none, declares more than it can hold, or leads outside of itself.
+    """
+    import pyarrow as pa
+
+    try:
+        with pa.memory_map(str(path)) as file:
+            file.seek(_MAGIC)
+            declared, messages = 0, pa.ipc.MessageReader.open_stream(file)
+            while (message := _next(messages)) is not None:
+                declared += _unpacked(message)
+            check_declared(declared, path.stat().st_size)
+            file.seek(0)
+            batches = pa.ipc.open_file(file)
+            for i in range(batches.num_record_batches):
+                batches.get_batch(i).validate(full=True)
+    except DamagedFile:
+        raise
+    except (pa.ArrowException, struct.error, StopIteration, *BROKEN) as error:
+        raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error
+
+
+def check_parquet(path: Path) -> None:
+    """Check that a Parquet file declares no more than it can hold.
+
+    Raises:
+        DamagedFile: it does, or is none.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    try:
+        about, size = pyarrow.parquet.read_metadata(path), path.stat().st_size
+        check_declared(sum(about.row_group(i).total_byte_size for i in range(about.num_row_groups)), size)
+        check_declared(8 * about.num_rows * about.num_columns, size)
+    except DamagedFile:
+        raise
+    except (pa.ArrowException, *BROKEN) as error:
+        raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error
+
+
+def _next(messages: Any) -> Any:
+    """The next message; None behind the last."""
+    try:
+        return messages.read_next_message()
+    except StopIteration:
+        return None
+
+
+def _unpacked(message: Any) -> int:
+    """Bytes that the body of a message takes in memory: what is not packed stays in the file."""
+    if message.type not in ("record batch", "dictionary") or message.body is None:
+        return 0
+    told, body = message.metadata.to_pybytes(), message.body
+    batch = _field(told, _number("<I", told, 0), _HEADER)
+    if message.type == "dictionary" and batch:  # a batch of its own within
+        batch = _field(told, batch, 1)
+    if not batch or not _field(told, batch, _COMPRESSION) or not (buffers := _field(told, batch, _BUFFERS)):
+        return 0
+    declared = 0
+    for i in range(_number("<I", told, buffers)):
+        place, length = struct.unpack_from("<qq", told, buffers + 4 + 16 * i)
+        if length >= 8:
+            declared += max(_number("<q", body[place : place + 8].to_pybytes(), 0), 0)
+    return declared
+
+
+def _field(told: bytes, table: int, which: int) -> int:
+    """Where what a field of a flatbuffer's table refers to begins; 0 where the table has no such field."""
+    described = table - _number("<i", told, table)
+    if 4 + 2 * which >= _number("<H", told, described):
+        return 0
+    offset = _number("<H", told, described + 4 + 2 * which)
+    return table + offset + _number("<I", told, table + offset) if offset else 0
+
+
+def _number(kind: str, told: bytes, at: int) -> int:
+    if at < 0:
+        raise struct.error(f"a place before the beginning: {at}")
+    return struct.unpack_from(kind, told, at)[0]

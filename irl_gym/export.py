@@ -17,6 +17,7 @@ Axes: T steps, N episodes.
 import contextlib
 import hashlib
 import json
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -146,8 +147,7 @@ def _published(folder: Path, base: Path, dataset_id: str) -> dict[str, Any] | No
 def _alone(folder: Path, dataset_id: str) -> Iterator[None]:
     """Hold the folder of an export, as `held`; it goes if nothing is in it."""
     try:
-        if folder.is_symlink() or _cleared(folder).is_symlink():
-            raise RunConflict(f"{folder} is a link: expected the folder of an export. Delete it.")
+        _check_ours(folder)
         with held(folder, f"another process exports {dataset_id!r} into {folder.parent}: wait for it."):
             try:
                 yield
@@ -157,6 +157,17 @@ def _alone(folder: Path, dataset_id: str) -> Iterator[None]:
     finally:
         with contextlib.suppress(OSError):  # something is in it, or somebody
             folder.rmdir()
+
+
+def _check_ours(folder: Path) -> None:
+    """Check that nobody put something in the place of an export's folder, whose name can be foreseen: an agent in it is loaded.
+
+    Raises:
+        RunConflict: somebody did.
+    """
+    for one in (folder, _cleared(folder)):
+        if one.is_symlink() or (one.exists() and hasattr(os, "geteuid") and one.stat().st_uid != os.geteuid()):
+            raise RunConflict(f"{one} is a link, or another user's: expected what an export of yours left. Delete it.")
 
 
 def _begun(folder: Path) -> bool:

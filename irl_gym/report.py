@@ -28,9 +28,9 @@ COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 
 
 def print_report(report: Report, console: Console) -> None:
-    """Print what a run found."""
+    """Print what a run found; brackets and colons in names are no markup."""
     for part in render(report):
-        console.print(part)
+        console.print(part, markup=False, emoji=False)
 
 
 def render(report: Report) -> Iterator[RenderableType]:
@@ -121,7 +121,7 @@ def _policies(report: Report) -> Table:
     if report.metrics["table"] is not None:
         table.caption += f"\ntable: {_table(report.metrics['table'])}"
     table.caption += f"\njudged: {found.told}"
-    table.caption += _of_training(report)
+    table.caption = Text(table.caption + _of_training(report), "table.caption")
     table.caption_justify = "left"
     return table
 
@@ -180,7 +180,7 @@ def _reward(report: Report) -> Table:
     table.add_column("what")
     table.add_column("is")
     for what, told in told_of_reward(reward, report.metrics):
-        table.add_row(what, told)
+        table.add_row(what, Text(told))
     tie = "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
     told = (tie if "worst_tie_regret" in reward else "", f"{AT_STAKE} " if reward.get("loss_share") is not None else "")
     table.caption = "".join(told) + _CAPTIONS.get(reward["learner"], "")

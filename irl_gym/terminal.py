@@ -50,11 +50,11 @@ def check_writable(out: Path) -> None:
 
 
 def print_table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]], width: int = 150) -> None:
-    """Figures in rows and columns."""
+    """Figures in rows and columns; brackets and colons in names are no markup."""
     table = Table(*columns, title=title)
     for row in rows:
         table.add_row(*row)
-    Console(width=width).print(table)
+    Console(width=width, markup=False, emoji=False).print(table)
 
 
 def print_error(error: Exception) -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import tracemalloc
+from pathlib import Path
 
 import gymnasium as gym
 import minari
@@ -230,6 +231,24 @@ def test_what_the_demonstrator_kept_is_found_again(tmp_path):
     seen = []
     run(tmp_path, begin=lambda folder: seen.append((folder / "expert.zip").read_text()) or Numbered())
     assert seen == ["trained"]
+
+
+@pytest.mark.parametrize("where", ["", ".ready", "/shards"])
+def test_nothing_is_written_or_read_through_a_link_in_place_of_an_exports_folder(cut_off, tmp_path_factory, where):
+    (folder,) = cut_off.glob(".exporting-*")
+    planted, outside = Path(f"{folder}{where}"), tmp_path_factory.mktemp("outside") / "there"
+    if planted.exists():
+        planted.rename(outside)
+    planted.symlink_to(outside)
+    with pytest.raises(RunConflict, match="is a link"):
+        run(cut_off)
+    assert not outside.exists() or len(list(outside.rglob("*.npz"))) == 4
+
+
+def test_a_folder_that_another_user_put_there_is_refused(cut_off, monkeypatch):
+    monkeypatch.setattr("os.geteuid", lambda: os.getuid() + 1)
+    with pytest.raises(RunConflict, match="or another user's: expected what an export of yours left"):
+        run(cut_off)
 
 
 def test_two_processes_at_one_export_are_kept_apart(tmp_path):

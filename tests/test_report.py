@@ -152,3 +152,14 @@ def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
     policies = TAXI | {"retrained": TAXI["retrained"] | {"score": score}}
     text = said(tmp_path, policies=policies, coloured=True)
     assert f"\x1b[31m{score:.3f}\x1b" in text and "\x1b[31m-139.000 (-155.000 to -123.000)\x1b" in text
+
+
+@pytest.mark.parametrize("name", ["a[/b]", "a[red]b", "a:warning:b", "a[link=x]b[/link]"])
+def test_names_are_printed_as_they_are_and_never_read_as_markup(tmp_path, name):
+    policies = {"expert": {"score": None}, "random": {"score": None}, "retrained": {"score": None}}
+    text = said(
+        tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies, status=f"it is {name}",
+        config={"env_kwargs": {"map": name}, "dataset": name},
+    )  # fmt: skip
+    assert f"/{name}: dataset, reward" in text and f"/{name}/report.html in a browser" in text
+    assert f"(map={name})" in text and f"There is no score: of {name}." in text and f"status │ it is {name}" in text

@@ -125,7 +125,7 @@ def write_shown(path: Path, states: States | None, normaliser: Normaliser | None
     if isinstance(states, StateIndex | ListedStates):
         listed = isinstance(states, ListedStates)
         low_count = np.zeros((0, 2)) if listed else ranges(states.space)
-        arrays = {
+        arrays: dict[str, Any] = {
             "how": np.array(ROWS), "space": np.array(serialize_space(states.space)),
             "numbers": states.numbers if listed else np.zeros(0), "low": low_count[:, 0], "counts": low_count[:, 1],
             "copies": np.array(list(states.terminal_copies.items()), dtype=np.int64).reshape(-1, 2),

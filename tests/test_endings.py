@@ -153,6 +153,7 @@ def test_the_loop_teaches_no_action_in_an_end(data, tmp_path):
     loop = Loop(asked(tmp_path, after_end="cut"), tmp_path / "run")
     loop.stage("expert")
     assert np.isnan(np.load(tmp_path / "run" / "expert.npz")["actions"][5]).all()
+    assert loop.stage("demonstrations")["steps_cut"] == 3
 
 
 def test_the_command_line_has_the_choice_in_the_same_words():

@@ -105,6 +105,19 @@ def test_an_unhealthy_run_names_the_doctor(tmp_path):
     assert f"The doctor found 1 thing: python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
 
 
+def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
+    lost = {"given": True, "episodes_only": True, "episodes": 1200, "dataset": "me/log-v0", "dropped": 1000, "steps_cut": 17}
+    told = "Of the 1,200 episodes learned from: 1,000 episodes whose last action was dropped when they were imported"
+    text = said(tmp_path, demonstrations=lost)
+    assert told in text and "17 steps cut off after an end." in text
+
+
+def test_what_is_wrong_with_the_given_expert_is_told_at_once(tmp_path):
+    found = {"name": "blind-expert", "sentence": "The expert returns 110 here.", "mend": "Give the statistics."}
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [found]}))
+    assert "Warning: The expert returns 110 here. Give the statistics." in said(tmp_path)
+
+
 def test_a_dataset_is_told_with_its_environment(tmp_path):
     (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0"}))
     assert said(tmp_path, config={"env_id": None, "dataset": "me/two-v0"}).startswith("Lake-v0, the environment of me/two-v0;")

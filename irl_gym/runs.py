@@ -23,6 +23,7 @@ from irl_gym.errors import IrlGymError, RunIncomplete
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.listed_states import usual_observation
 from irl_gym.names import action_names, state_name
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RECORDS, read_json
@@ -98,7 +99,8 @@ class Run:
         if self.table is None:
             raise RunIncomplete(f"{self.path} has no table, so row {row} has no name: expected a run with states.")
         observation = self.table.states.decode(row)
-        return state_name(self.env_id, observation, None if self.grid is None else self.grid.shape[1])
+        columns = None if self.grid is None else self.grid.shape[1]
+        return state_name(self.env_id, observation, columns, usual_observation(self.table.states))
 
 
 def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:

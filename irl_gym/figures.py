@@ -14,6 +14,7 @@ from irl_gym.dynamic_programming import evaluate_policy
 from irl_gym.evaluation import learning_curve
 from irl_gym.layouts import GridLayout, grid_layout
 from irl_gym.linear_reward import LinearReward
+from irl_gym.listed_states import usual_observation
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import optimal_actions
 from irl_gym.names import Names, action_names, state_name
@@ -67,7 +68,8 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
         return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})
     agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
     optimal = optimal_actions(mdp, true)
-    names = Names(action_names(loop.env), lambda row: state_name(loop.env_id, table.states.decode(row), None))
+    usual = usual_observation(table.states)
+    names = Names(action_names(loop.env), lambda row: state_name(loop.env_id, table.states.decode(row), None, usual))
     return {
         "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp, names),
         "values.png": plotting.draw_values(layout, values[0], values[1], mdp, names),

@@ -31,6 +31,8 @@ ACTIONS: dict[str, tuple[str, ...]] = {
 
 SHOWN = 8
 """Numbers of an observation that a name lists."""
+TOLD = 3
+"""Of more numbers, those that are told with their places."""
 
 
 @dataclass(frozen=True)
@@ -66,21 +68,30 @@ def action_names(env: gym.Env) -> tuple[str, ...]:
     return of_class(env, ACTIONS, n) or tuple(f"action {a}" for a in range(n))
 
 
-def state_name(env_id: str | None, observation: Any, columns: int | None = None) -> str:
+def state_name(env_id: str | None, observation: Any, columns: int | None = None, usual: Any = None) -> str:
     """What an observation says, in a few words.
 
     Args:
         env_id: of the environment, or None.
         observation: a single one.
         columns: of the map, where the observation is the number of a cell.
+        usual: an observation that shows in each place what is usual there: of many numbers, those that differ from it are told.
+            None for the number that the observation itself shows most.
     """
     if isinstance(observation, dict):
-        own = [state_name(env_id, observation["observation"])] if "observation" in observation else []
-        shown = [f"{key} {state_name(None, one)}" for key, one in observation.items() if key != "observation"]
-        return ", ".join(own + shown)
+        beside = usual if isinstance(usual, dict) else {}
+        own = (
+            [state_name(env_id, observation["observation"], usual=beside.get("observation"))]
+            if "observation" in observation
+            else []
+        )
+        others = [(key, one) for key, one in observation.items() if key != "observation"]
+        return ", ".join([*own, *(f"{key} {state_name(None, one, usual=beside.get(key))}" for key, one in others)])
     if isinstance(observation, tuple):
         told = _of_cards(observation) if bare_name(env_id) == "Blackjack" and len(observation) == 3 else None
-        return told or f"({', '.join(state_name(None, one) for one in observation)})"
+        beside = usual if isinstance(usual, tuple) else (None,) * len(observation)
+        parts = (state_name(None, one, usual=other) for one, other in zip(observation, beside, strict=True))
+        return told or f"({', '.join(parts)})"
     array = np.asarray(observation)
     if array.ndim == 0 and array.dtype.kind in "iu":
         number = int(array)
@@ -88,9 +99,24 @@ def state_name(env_id: str | None, observation: Any, columns: int | None = None)
             return _of_taxi(number)
         return f"{number}" if columns is None else f"row {number // columns}, column {number % columns}"
     if array.size > SHOWN:
-        return f"{' x '.join(map(str, array.shape))} numbers"
+        return _of_many(array, usual)
     parts = [f"{one:d}" if array.dtype.kind in "iub" else f"{one:.3g}" for one in array.ravel().tolist()]
     return parts[0] if len(parts) == 1 else f"({', '.join(parts)})"
+
+
+def _of_many(array: np.ndarray, usual: Any) -> str:
+    """Many numbers, by those that are unlike the usual ones."""
+    what = f"{' x '.join(map(str, array.shape))} numbers"
+    if array.dtype.kind not in "iub":
+        return what
+    values, counts = np.unique(array, return_counts=True)
+    base = np.asarray(values[counts.argmax()] if usual is None else usual)
+    places = np.argwhere(array != base).tolist()
+    if not places:
+        return f"{what}, all {int(base):d}" if base.ndim == 0 else what
+    told = [f"{int(array[tuple(place)]):d} at {place}" for place in places[:TOLD]]
+    more = [f"{len(places) - TOLD} more"] if len(places) > TOLD else []
+    return f"{what}: {', '.join(told + more)}"
 
 
 def _of_cards(observation: tuple[Any, ...]) -> str:

@@ -28,7 +28,7 @@ from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
 
 ON_COMMAND_LINE: dict[type[Exception], str] = {
-    HiddenState: "(On the command line: --start-seeds 0, --reveal name=number or name=[value,value], --table sample.)",
+    HiddenState: "(On the command line: --start-seeds 0, --reveal name=number, --table sample.)",
     EnumerationLimit: "(On the command line: --max-states, with --out naming the same folder.)",
 }
 """How the mends of errors are asked for there."""

@@ -22,6 +22,8 @@ from irl_gym.errors import RunConflict
 from irl_gym.own_files import LOCK, digest, scratch, write_bytes
 
 NOT_THE_SAME = "is not the file that the run left, by its sha256: it was changed, damaged, or copied from another run"
+SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
+"""What is raised by content that no run leaves."""
 RECORDS = ".stages"
 """Where the records of finished stages are, in the folder of a run."""
 

@@ -20,18 +20,17 @@ from irl_gym.errors import InvalidInput, IrlGymError, RunIncomplete
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
+from irl_gym.listed_states import usual_observation
 from irl_gym.names import state_name
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import NOT_THE_SAME, START, changed, read_json, read_record
+from irl_gym.run_folder import NOT_THE_SAME, START, SURPRISES, changed, read_json, read_record
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
 from irl_gym.verified import recomputed
 
-SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
-"""What is raised by content that no run leaves."""
 ONCE = ("config.json", "run.json")
 """Files that no stage writes: they are there from the start."""
 
@@ -108,7 +107,8 @@ class Run:
         if self.table is None:
             raise RunIncomplete(f"{self.path} has no table, so row {row} has no name: expected a run with states.")
         observation = self.table.states.decode(row)
-        return state_name(self.env_id, observation, None if self.grid is None else self.grid.shape[1])
+        columns = None if self.grid is None else self.grid.shape[1]
+        return state_name(self.env_id, observation, columns, usual_observation(self.table.states))
 
 
 def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+RAND, RANDOM = np.random.rand, random.random
 Racetrack = runpy.run_path(str(Path(__file__).parents[1] / "scripts/measure_environments.py"))["Racetrack"]
 """The one that is measured."""
 
@@ -52,6 +53,10 @@ class Slippery(Corridor):
                 return np.random.rand() < 0.2  # noqa: NPY002 (what some environments do)
             case "module random":
                 return random.random() < 0.2
+            case "imported from np.random":
+                return RAND() < 0.2
+            case "imported from random":
+                return RANDOM() < 0.2
             case "normal":
                 return self.np_random.normal() < -0.8416212335729143  # the quantile of 0.2
             case "many outcomes":

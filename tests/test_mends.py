@@ -1,6 +1,7 @@
 """The mends that errors about environments name are executed: what stands between backquotes is evaluated, and serves."""
 
 import re
+import threading
 
 import gymnasium
 import numpy
@@ -14,16 +15,21 @@ from irl_gym.counting import Interaction, interact
 from irl_gym.discretize import discretize
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import (
+    EnvironmentFailed,
     HiddenState,
     InvalidMDP,
     InvalidParameter,
     InvalidPolicy,
+    NotCopied,
     NotDiscrete,
     NotTabular,
     UnknownObservation,
 )
+from irl_gym.experiment import Experiment
+from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.minari_files import identity
+from irl_gym.places import place_of
 from irl_gym.planners import ValueIteration
 from irl_gym.policies import as_distribution
 from irl_gym.reveal import Reveal
@@ -359,6 +365,43 @@ def test_a_row_that_is_nearly_1_is_told_by_how_much_and_mended_by_its_sum():
         TabularMDP(np.eye(3) * (1 + 4e-9) * np.float64(1), GAMMA, np.eye(3)[0])
     with pytest.raises(InvalidPolicy, match=r"sums to 1\.0000001"):
         as_distribution(P, 3, 3)
+
+
+class Raises(Corridor):
+    """Cannot be stepped."""
+
+    def step(self, action):
+        raise OSError("no such device")
+
+
+class Locked(Corridor):
+    """Cannot be copied."""
+
+    def __init__(self):
+        super().__init__()
+        self.lock = threading.Lock()
+
+
+OFFERED = {
+    "words": (Shows(*SHOWN["words"]), NotDiscrete, False),
+    "raises": (Raises(), EnvironmentFailed, False),
+    "locked": (Locked(), NotCopied, False),
+    "renewing": (Renewing(), NotTabular, True),
+    "clocked": (Clocked(), HiddenState, True),
+}
+
+
+@pytest.mark.parametrize("name", OFFERED)
+def test_counting_is_offered_by_a_run_where_it_does_not_lead_to_the_same_error(tmp_path, name):
+    env, error, serves = OFFERED[name]
+    with pytest.raises(error) as caught:
+        place_of(Experiment("Corridor-v0", GAMMA, learner=FiniteLP()), env, tmp_path / "run", lambda share: None)
+    assert ("--table sample" in str(caught.value)) == serves
+    if serves:
+        assert tabulate(env, gamma=GAMMA, by=Interaction(500)).mdp.n_states == 7
+    else:
+        with pytest.raises(error):
+            tabulate(env, gamma=GAMMA, by=Interaction(500))
 
 
 def test_the_layouts_of_one_seed_are_one():

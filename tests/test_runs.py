@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from forgetting import without_digests
+from gymnasium import spaces
 from tiny_env import TableEnv, lottery
 
 from irl_gym.claims import write_environment
@@ -17,6 +18,7 @@ from irl_gym.errors import RunConflict, RunIncomplete, RunNewer
 from irl_gym.experiment import Experiment
 from irl_gym.layouts import grid_layout
 from irl_gym.linear_reward import load_reward
+from irl_gym.listed_states import ListedStates, usual_observation
 from irl_gym.loop import Loop
 from irl_gym.metrics import policy_value
 from irl_gym.names import action_names, state_name
@@ -351,11 +353,26 @@ def test_a_curve_is_read_as_it_was_written(tmp_path):
         ("Blackjack-v1", {"natural": 1, "observation": (21, 1, 1)}, "21 with an ace against ace, natural 1"),
         ("Deck-v0", (3, 1), "(3, 1)"),
         ("CartPole-v1", np.array([0.01234, -1.0, 0, 0], dtype=np.float32), "(0.0123, -1, 0, 0)"),
-        (None, np.zeros((7, 7, 3), dtype=np.uint8), "7 x 7 x 3 numbers"),
+        (None, np.zeros((7, 7, 3), dtype=np.uint8), "7 x 7 x 3 numbers, all 0"),
+        (None, np.eye(5, dtype=np.int8)[[1, 0, 0, 0, 0]] * 2, "5 x 5 numbers: 2 at [0, 1], 2 at [1, 0], 2 at [2, 0], 2 more"),
+        (None, np.zeros(9, dtype=np.float32), "9 numbers"),
     ],
 )
 def test_a_state_is_called_by_its_observation(env_id, observation, name):
     assert state_name(env_id, observation) == name
+
+
+def test_states_of_many_numbers_are_called_by_what_differs():
+    maps = np.tile(np.arange(25).reshape(5, 5) % 3, (4, 1, 1)).reshape(4, 25)
+    maps[np.arange(4), [3, 7, 11, 24]] = 9
+    states = ListedStates(spaces.Box(0, 9, (5, 5), np.int8), maps[np.lexsort(maps.T[::-1])])
+    names = [state_name(None, states.decode(row), usual=usual_observation(states)) for row in range(4)]
+    assert sorted(names) == [f"5 x 5 numbers: 9 at {place}" for place in ([0, 3], [1, 2], [2, 1], [4, 4])]
+
+
+def test_parts_of_many_numbers_are_called_by_what_differs():
+    usual = {"map": np.zeros(9, dtype=np.int8), "key": 0}
+    assert state_name(None, {"map": np.eye(9, dtype=np.int8)[4], "key": 1}, usual=usual) == "map 9 numbers: 1 at [4], key 1"
 
 
 def test_actions_that_nobody_named_are_numbered():

@@ -18,8 +18,7 @@ from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RECORDS, START, changed, read_json, read_record
-from irl_gym.runs import SURPRISES
+from irl_gym.run_folder import RECORDS, START, SURPRISES, changed, read_json, read_record
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space

@@ -14,6 +14,7 @@ changes the draws, and refused.
 
 import random
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ import numpy as np
 from irl_gym.checks import checked_number
 from irl_gym.enumeration.draw_tree import Cut, Path, Script
 from irl_gym.enumeration.driven import RANDOM, Odd
+from irl_gym.enumeration.driven_modules import DrivenModules
 from irl_gym.enumeration.driven_numpy import GENERATOR, RANDOM_STATE
 from irl_gym.errors import NotEnumerable
 
@@ -32,13 +34,15 @@ class Draws:
 
     Args:
         most: outcomes of one call at most.
+        modules: drive the functions of the modules random and numpy.random too.
     """
 
-    def __init__(self, most: int = 20_000):
+    def __init__(self, most: int = 20_000, *, modules: bool = False):
         self.most = int(checked_number("most", most, "a whole number of at least 1", least=1, whole=True))
         self._path: Path | None = None
         self._real: _Real | None = None
         self._stand_ins = {base: stand_in(self) for base, stand_in in _STAND_INS.items()}
+        self._driven = DrivenModules(self._stand_ins).driven if modules else nullcontext
 
     def twin(self, generator: Any) -> Any | None:
         """The driven stand-in of a generator that an environment holds; None for anything else.
@@ -79,7 +83,8 @@ class Draws:
         """Call `run` once with real random numbers; a NumPy generator gives those of `np.random.default_rng(seed)`."""
         before, self._real, path, self._path = self._real, _Real(seed), self._path, None
         try:
-            return run()
+            with self._driven():
+                return run()
         finally:
             self._real, self._path = before, path
 
@@ -90,7 +95,8 @@ class Draws:
         result: Any = None
         try:
             path.begin()
-            result = run()
+            with self._driven():
+                result = run()
         except Cut:
             pass
         except Exception as error:

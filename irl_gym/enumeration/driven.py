@@ -10,13 +10,28 @@ n elements, of which k are taken.
 import math
 import operator
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from irl_gym.enumeration.uniforms import Run, Uniform, Unit
 
 
 class Odd(Exception):
     """Arguments that are wrong, or right and not driven here."""
+
+
+class Unlisted(Unit):
+    """A number of which nothing is known, such as a normal one: it may be multiplied by zero, or left alone."""
+
+    __slots__ = ()
+    kind = ""
+
+    def __init__(self, run: Run, method: str):
+        super().__init__(run, method)
+        self.low, self.high = -math.inf, math.inf
+
+    def split(self, cuts: list[float]) -> NoReturn:
+        """Refuse: no part of it has a probability that is known here."""
+        self.refuse("is used, and its outcomes cannot be listed one by one")
 
 
 def pick(run: Run, method: str, keys: Sequence[Hashable], weights: Sequence[float] | None = None) -> int:
@@ -74,6 +89,21 @@ def _uniform(run: Run, a: float, b: float) -> Any:
     if not math.isfinite(b - a):
         raise Odd(f"uniform({a}, {b})")
     return Uniform(Unit(run, "uniform")) * (b - a) + a
+
+
+def unlisted(run: Run, method: str, mean: float, deviation: float) -> Any:
+    """A normal number, which is its mean where it does not deviate."""
+    if not (math.isfinite(mean) and 0 <= deviation < math.inf):
+        raise Odd(f"{method}({mean}, {deviation})")
+    return Uniform(Unlisted(run, method)) * float(deviation) + float(mean)
+
+
+def _gauss(run: Run, mu: float = 0.0, sigma: float = 1.0) -> Any:
+    return unlisted(run, "gauss", mu, sigma)
+
+
+def _normalvariate(run: Run, mu: float = 0.0, sigma: float = 1.0) -> Any:
+    return unlisted(run, "normalvariate", mu, sigma)
 
 
 def _randrange(run: Run, start: int, stop: int | None = None, step: int = 1) -> int:
@@ -145,6 +175,7 @@ def _sample(run: Run, population: Any, k: int, *, counts: Iterable[int] | None =
 
 RANDOM: dict[str, Callable[..., Any]] = {
     "random": _random, "uniform": _uniform, "randrange": _randrange, "randint": _randint, "getrandbits": _getrandbits,
-    "choice": _choice, "choices": _choices, "shuffle": _shuffle, "sample": _sample,
+    "choice": _choice, "choices": _choices, "shuffle": _shuffle, "sample": _sample, "gauss": _gauss,
+    "normalvariate": _normalvariate,
 }  # fmt: skip
 """Methods of `random.Random` that are driven; all others are refused."""

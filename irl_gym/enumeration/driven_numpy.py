@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.enumeration.driven import Odd, afford, keys_of, order, pick
+from irl_gym.enumeration.driven import Odd, afford, keys_of, order, pick, unlisted
 from irl_gym.enumeration.uniforms import Run, Uniform, Unit
 
 
@@ -149,6 +149,23 @@ def _uniform(run: Run, low: Any = 0.0, high: Any = 1.0, size: Any = None, *, met
     return _filled(numbers, shape, object)
 
 
+def _normal(run: Run, loc: Any = 0.0, scale: Any = 1.0, size: Any = None, *, method: str = "normal") -> Any:
+    """Normal numbers, of which nothing is known but their mean where they do not deviate."""
+    shape, each = _broadcast(_shape(size), loc, scale)
+    numbers = [unlisted(run, method, *single) for single in each]
+    return _filled(numbers, shape, object if any(isinstance(one, Uniform) for one in numbers) else np.float64)
+
+
+def _standard_normal(run: Run, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
+    if out is not None or np.dtype(dtype) != np.float64:
+        raise Odd(f"{np.dtype(dtype)} numbers, or numbers in an array")
+    return _normal(run, size=size, method="standard_normal")
+
+
+def _randn(run: Run, *shape: int) -> Any:
+    return _normal(run, size=shape or None, method="randn")
+
+
 def _random(run: Run, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
     if out is not None or np.dtype(dtype) != np.float64:
         raise Odd(f"{np.dtype(dtype)} numbers, or numbers in an array")
@@ -241,11 +258,12 @@ def _multinomial(run: Run, n: Any, pvals: Any, size: Any = None) -> Any:
 
 _SHARED: dict[str, Callable[..., Any]] = {
     "binomial": _binomial, "hypergeometric": _hypergeometric, "multinomial": _multinomial, "permutation": _permutation,
-    "shuffle": _shuffle, "uniform": _uniform,
+    "shuffle": _shuffle, "uniform": _uniform, "normal": _normal, "standard_normal": _standard_normal,
 }  # fmt: skip
 GENERATOR = _SHARED | {"choice": _choice, "integers": _integers, "permuted": _permuted, "random": _random}
 """Methods of `np.random.Generator` that are driven; all others are refused."""
 RANDOM_STATE = _SHARED | {
     "choice": _choice_of_state, "rand": _rand, "randint": _randint, "random": _random_sample, "random_sample": _random_sample,
+    "randn": _randn,
 }  # fmt: skip
 """The same for `np.random.RandomState`."""

@@ -67,6 +67,8 @@ class Explored:
         """Attributes that belong to the inner state however large they are."""
         self.outside = ""
         """What it draws from that is not its own, so that all is counted; empty for nothing."""
+        self.modules = False
+        """Were the functions of the modules random and numpy.random driven?"""
         self.sampled: set[int] = set()
         """Pairs, number of the state * A + action, whose lines are counts."""
         self.resets = 0
@@ -145,6 +147,7 @@ class Explored:
             identity=np.array(json.dumps(identity, sort_keys=True)), counted=np.array(json.dumps(counted)),
             sampled=np.array(sorted(row for row in self.sampled if row < expanded * self.n_actions), dtype=np.int64),
             always=np.array(json.dumps(self.always)), outside=np.array(self.outside), resets=np.array(self.resets),
+            modules=np.array(self.modules),
             states=numbers_of_keys(space, self.keys[:n]), ends=ends,
             parents=np.array(self.parents[:n]), actions=np.array(self.actions[:n]),
             script_lengths=np.array([len(script) for script in scripts], dtype=np.int64),
@@ -257,6 +260,7 @@ def _rebuilt(found: dict[str, np.ndarray], told: dict[str, Any], space: spaces.S
     explored.always = tuple(told["always"])
     explored.sampled = set(found["sampled"].tolist())
     explored.outside, explored.resets = str(found["outside"]), int(found["resets"])
+    explored.modules = "modules" in found and bool(found["modules"].any())  # a file of an earlier version
     if len(explored.ids) < len(keys) or len(explored.ends) < len(found["ends"]):
         raise DamagedFile("a state stands in it twice: expected each once.")
     explored.settle()

@@ -42,18 +42,19 @@ class Explorer:
         explored: where an earlier search stopped; None to begin.
         always: names of attributes that belong to the inner state however large they are.
         counting: count every random step, since draws do not tell all.
+        modules: drive the functions of the modules random and numpy.random too.
         on_states: told the states tried and found while one call takes long.
     """
 
     def __init__(
         self, env: gym.Env, limits: Limits, explored: Explored | None, always: frozenset[str], counting: bool,
-        on_states: Callable[[int, int], None] = lambda tried, found: None,
+        modules: bool = False, on_states: Callable[[int, int], None] = lambda tried, found: None,
     ):  # fmt: skip
         space: Any = env.action_space
         self.limits, self.n_actions = limits, int(space.n)
         self.space = env.observation_space
         self._key_of = key_of(self.space)
-        self.trials = Trials(env, limits, always, counting)
+        self.trials = Trials(env, limits, always, counting, modules)
         self._waiting: dict[int, Any] = {}
         self._marks: dict[int, tuple[int, ...]] = {}
         self._arrivals: dict[int, int] = {}

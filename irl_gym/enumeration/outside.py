@@ -1,7 +1,8 @@
 """Randomness that is not driven: generators that an environment draws from and does not hold.
 
-Enumeration drives the generators that an environment holds in its attributes. Draws from elsewhere are none of its outcomes, so
-no table is exact where they occur, whether or not they have mattered yet. Watched are
+Enumeration drives the generators that an environment holds in its attributes, and where it draws from those of the modules
+random and numpy.random, their functions too (`driven_modules`). Draws from elsewhere are none of its outcomes, so no table is
+exact where they occur, whether or not they have mattered yet. Watched are
 
     random, numpy.random    the generators that Python and NumPy share
     of the classes          generators that are attributes of the environment's classes and wrappers, names of the modules that
@@ -22,7 +23,7 @@ import numpy as np
 from irl_gym.copies.stripped import GENERATORS, layers
 
 UNSEEN = "a clock, or a generator that nothing of the environment's holds"
-PYTHONS = "the module random"
+PYTHONS, NUMPYS = "the module random", "the module numpy.random"
 SUSPECTS, RARELY = 20, 100
 """Times that is looked at who draws from it, which is slow; of later times, each hundredth."""
 WORDS = 4 * 625
@@ -36,6 +37,11 @@ class OutsideRandomness(Exception):
         super().__init__(what)
         self.what = what
 
+    @property
+    def of_modules(self) -> bool:
+        """Are all of them the generators of modules, whose functions can be driven?"""
+        return set(self.what.split(" and ")) <= {PYTHONS, NUMPYS}
+
 
 class Watch:
     """The generators that an environment can draw from and that are not driven.
@@ -46,7 +52,7 @@ class Watch:
 
     def __init__(self, env: gym.Env):
         self._held = dict(_held(env))
-        self._names = (PYTHONS, "the module numpy.random", *self._held)
+        self._names = (PYTHONS, NUMPYS, *self._held)
         self._suspects = 0
         self.begin()
 

@@ -19,7 +19,7 @@ import gymnasium as gym
 import numpy as np
 
 from irl_gym.checks import checked_number
-from irl_gym.copies.calls import called
+from irl_gym.copies.calls import called, seeded_globals
 from irl_gym.copies.snapshots import ConstantChanged
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.copies.time_limits import check_limits, check_times, limited
@@ -85,13 +85,14 @@ class Enumeration(Limits):
         check_times(env)
         ranges(env.observation_space)  # refuses floats before anything is copied
         check_limits(env)
-        explored = self._explore(env, progress or (lambda tried, found: None))
+        with seeded_globals([self.seed]):
+            explored = self._explore(env, progress or (lambda tried, found: None))
         return _assembled(explored, env, gamma, self)
 
     def _explore(self, env: gym.Env, on_states: OnStates) -> Explored:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
         always: frozenset[str] = frozenset()
-        outside = ""
+        outside, modules = "", False
         if self.checkpoint is not None and not Path(self.checkpoint).absolute().parent.is_dir():
             raise InvalidParameter(f"checkpoint is {str(self.checkpoint)!r}: expected a file in a folder that exists. Make it.")
         while True:
@@ -99,13 +100,13 @@ class Enumeration(Limits):
             if self.checkpoint is not None and Path(self.checkpoint).exists():
                 space: Any = env.action_space
                 explored = load_explored(Path(self.checkpoint), env.observation_space, int(space.n), self._identity(env))
-                outside = outside or explored.outside
+                outside, modules = outside or explored.outside, modules or explored.modules
                 always |= frozenset(explored.always)
             try:
                 own = without_watchers(env)
                 called(lambda own=own: own.reset(seed=self.seed))
-                explorer = Explorer(own, self, explored, always, bool(outside), on_states)
-                explorer.explored.outside = outside
+                explorer = Explorer(own, self, explored, always, bool(outside), modules, on_states)
+                explorer.explored.outside, explorer.explored.modules = outside, modules
                 explorer.explored.always = tuple(sorted(always))
                 explorer.explored.settle()
                 self._run(explorer, env, on_states)
@@ -123,7 +124,8 @@ class Enumeration(Limits):
                     "counts on it."
                 ) from error
             except OutsideRandomness as error:
-                outside = error.what
+                drive = error.of_modules and not (modules or outside)
+                outside, modules = ("", True) if drive else (error.what, False)
                 self._forget()
 
     def _run(self, explorer: Explorer, env: gym.Env, on_states: OnStates) -> None:

@@ -65,13 +65,14 @@ class Trials:
         limits: outcomes and runs.
         always: names of attributes that belong to the inner state however large they are.
         counting: count every random call, since draws do not tell all.
+        modules: drive the functions of the modules random and numpy.random too.
     """
 
-    def __init__(self, env: gym.Env, limits: Limits, always: frozenset[str], counting: bool):
+    def __init__(self, env: gym.Env, limits: Limits, always: frozenset[str], counting: bool, modules: bool = False):
         space: Any = env.action_space
         self.env, self.limits, self.counting = env, limits, counting
         self.first_action = int(space.start)
-        self.draws = Draws(limits.most_outcomes)
+        self.draws = Draws(limits.most_outcomes, modules=modules)
         self.snapshots = Snapshots(env, self.draws.twin)
         self.snapshots.include(always)
         self.fresh = self.snapshots.take()

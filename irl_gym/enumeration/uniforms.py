@@ -46,6 +46,7 @@ class Unit:
     """A number uniform on [0, 1), of which only an interval is known."""
 
     __slots__ = ("high", "low", "method", "number", "run")
+    kind = "uniform "
 
     def __init__(self, run: Run, method: str):
         self.run, self.number, self.method = run, run.number, method
@@ -67,7 +68,7 @@ class Unit:
     def refuse(self, how: str) -> NoReturn:
         """Raise NotEnumerable."""
         self.run.refuse(
-            f"a uniform number of {self.method}() {how}. Have the environment draw with integers() or choice(), or count "
+            f"a {self.kind}number of {self.method}() {how}. Have the environment draw with integers() or choice(), or count "
             "samples."
         )
 
@@ -139,6 +140,7 @@ class Uniform:
 
     def _settle(self, grain: float, offset: float, *, zero: bool = True) -> float:
         """Split at each (whole number + offset) * grain in reach; return the middle of what is left. Zero may be no cut."""
+        self.unit.split([])
         low, high = self._bounds()
         first, last = math.floor(low / grain - offset), math.ceil(high / grain - offset)
         if last - first > self.unit.run.most + 1:

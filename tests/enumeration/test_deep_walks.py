@@ -5,7 +5,7 @@ import re
 import gymnasium as gym
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import RAND, Corridor
 from gymnasium import spaces
 
 from irl_gym.enumeration import deep_walks
@@ -137,7 +137,7 @@ def test_walks_agree_with_a_table_that_is_right(counts):
 def test_a_late_draw_from_outside_is_no_hidden_state():
     class Late(Clock):
         def step(self, action):
-            return super().step(action) if self.t < 60 else (0, float(np.random.rand() < 0.5), False, False, {})  # noqa: NPY002
+            return super().step(action) if self.t < 60 else (0, float(RAND() < 0.5), False, False, {})
 
     np.random.seed(0)  # noqa: NPY002
     table = table_of(Late(10**9), runs=10)

@@ -219,7 +219,30 @@ DRIVEN = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("kind", "name"), [pair for pair in PUBLIC if pair[1] not in DRIVEN[pair[0]].split()])
+NORMAL = {"normal", "standard_normal", "randn", "gauss", "normalvariate"}
+
+
+@pytest.mark.parametrize(("kind", "name"), [pair for pair in PUBLIC if pair[1] in NORMAL])
+def test_a_normal_number_can_be_multiplied_by_zero_and_is_refused_where_it_is_used(kind, name):
+    draws = Draws()
+    generator = draws.twin(REAL[kind]())
+    assert [paid for _, _, paid in draws.outcomes(lambda: 2.0 + 0 * getattr(generator, name)())] == [2.0]
+    for use in (lambda x: x < 0, float, round, abs, lambda x: np.array([0.0]) < x):
+        with pytest.raises(NotEnumerable, match=rf"a number of {name}\(\) is used"):
+            list(draws.outcomes(lambda use=use: use(getattr(generator, name)())))
+
+
+@pytest.mark.parametrize(("kind", "name"), [("generator", "normal"), ("state", "normal"), ("random", "gauss")])
+def test_a_normal_number_that_does_not_deviate_is_its_mean(kind, name):
+    draws = Draws()
+    generator = draws.twin(REAL[kind]())
+    assert [drawn for _, _, drawn in draws.outcomes(lambda: getattr(generator, name)(3.0, 0.0))] == [3.0]
+
+
+OTHERS = [pair for pair in PUBLIC if pair[1] not in DRIVEN[pair[0]].split() and pair[1] not in NORMAL]
+
+
+@pytest.mark.parametrize(("kind", "name"), OTHERS)
 def test_every_other_method_is_refused_by_name(kind, name):
     def call(generator):
         found = getattr(generator, name)

@@ -66,7 +66,8 @@ ENVIRONMENTS = {
     "FrozenLake": lambda: gym.make("FrozenLake-v1", map_name="8x8"),
     "normal draws": lambda: Slippery("normal", n=30),
     "mixed draws": lambda: Slippery("mixed", n=30),
-    "draws from outside": lambda: Slippery("module random", n=30),
+    "draws from outside": lambda: Slippery("imported from random", n=30),
+    "draws from a module": lambda: Slippery("module random", n=30),
     "a map that changes": Large,
 }
 

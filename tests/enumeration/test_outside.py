@@ -4,7 +4,7 @@ import random
 
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import RAND, RANDOM, Corridor
 
 from irl_gym.enumeration.table import Enumeration
 
@@ -29,7 +29,7 @@ class Draws(Corridor):
 
 class DrawsAtReset(Corridor):
     def reset(self, *, seed=None, options=None):
-        random.random()
+        RANDOM()
         return super().reset(seed=seed)
 
 
@@ -41,7 +41,7 @@ class DrawsLate(Corridor):
     def step(self, action):
         self.steps += 1
         if self.steps > 100:
-            np.random.rand()  # noqa: NPY002
+            RAND()
         return self.moved(int(action) if self.cell < self.n - 2 else 0)
 
 
@@ -57,8 +57,8 @@ def closed_over():
 
 
 SOURCES = {
-    "the module random": lambda: Draws(lambda: random.random()),
-    "the module numpy.random": lambda: Draws(lambda: np.random.randint(3)),  # noqa: NPY002
+    "the module random": lambda: Draws(lambda: RANDOM()),
+    "the module numpy.random": lambda: Draws(lambda: RAND()),
     "Draws.of_class": lambda: Draws(lambda: Draws.of_class.random()),
     "MODULES_OWN": lambda: Draws(lambda: MODULES_OWN.random()),
     "Closed's mine": closed_over,

@@ -1,11 +1,12 @@
 """Steps whose draws cannot be enumerated are counted: how well, how often, and always the same."""
 
 import random
+import threading
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from enumeration_envs import Corridor, Slippery, same_table
+from enumeration_envs import RAND, Corridor, Slippery, same_table
 from gymnasium import spaces
 
 from irl_gym.enumeration.outside import shared_mark
@@ -15,8 +16,8 @@ from irl_gym.errors import NotTabular
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 
-COUNTED = ("module np.random", "module random", "normal", "many outcomes", "mixed")
-EXACT = ("generator", "random state", "random.Random")
+COUNTED = ("imported from np.random", "imported from random", "normal", "many outcomes", "mixed")
+EXACT = ("generator", "random state", "random.Random", "module np.random", "module random")
 
 
 def table_of(env, **limits):
@@ -74,16 +75,58 @@ def test_the_error_is_that_of_what_was_run_least():
 
 def test_counting_leaves_the_generators_that_all_share_as_they_were():
     np.random.seed(3)  # noqa: NPY002
-    before = np.random.get_state()[1].tolist()  # noqa: NPY002
-    table_of(Slippery("module random"))
-    assert np.random.get_state()[1].tolist() == before  # noqa: NPY002
+    before = np.random.get_state()[1].tolist(), random.getstate()  # noqa: NPY002
+    table_of(Slippery("imported from random"))
+    assert (np.random.get_state()[1].tolist(), random.getstate()) == before  # noqa: NPY002
+
+
+@pytest.mark.parametrize("kind", ["module np.random", "module random"])
+def test_driving_leaves_the_modules_as_they_were(kind):
+    np.random.seed(3)  # noqa: NPY002
+    before = np.random.get_state()[1].tolist(), random.getstate(), dict(vars(np.random)), dict(vars(random))  # noqa: NPY002
+    table_of(Slippery(kind))
+    after = np.random.get_state()[1].tolist(), random.getstate(), dict(vars(np.random)), dict(vars(random))  # noqa: NPY002
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda env: np.random.randn(),  # noqa: NPY002
+        lambda env: np.random.normal(2.0, 3.0),  # noqa: NPY002
+        lambda env: random.gauss(0, 1),
+        lambda env: env.np_random.standard_normal(),
+        lambda env: np.random.rand(),  # noqa: NPY002
+    ],
+)
+def test_what_is_drawn_only_to_be_multiplied_by_zero_leaves_the_table_exact(draw):
+    class Zero(Corridor):
+        def step(self, action):
+            observation, reward, *rest = self.moved(int(action))
+            return observation, reward + 0.0 * draw(self), *rest
+
+    assert same_table(table_of(Zero()), table_of(Corridor()))
+
+
+def test_another_thread_draws_from_the_modules_as_ever():
+    drawn = []
+
+    class Asks(Corridor):
+        def step(self, action):
+            other = threading.Thread(target=lambda: drawn.append(np.random.rand()))  # noqa: NPY002
+            other.start()
+            other.join()
+            return self.moved(int(action) if np.random.rand() < 0.5 else 0)  # noqa: NPY002
+
+    Enumeration(revisits=0, runs=5, start_runs=5).table(Asks(4), 0.9)
+    assert {type(one) for one in drawn} == {float}
 
 
 class RarelySlips(Corridor):
     """Draws outside its own generator, and once in fifty steps it matters."""
 
     def step(self, action):
-        return self.moved(1 - int(action) if np.random.rand() < 0.02 else int(action))  # noqa: NPY002
+        return self.moved(1 - int(action) if RAND() < 0.02 else int(action))
 
 
 def test_a_draw_from_outside_that_rarely_matters_is_noticed():
@@ -181,7 +224,7 @@ class Picture(gym.Env):
 
     def step(self, action):
         picture = np.zeros((64, 64), np.uint8)
-        picture[32, 32] = np.random.rand() < 0.5  # noqa: NPY002
+        picture[32, 32] = RAND() < 0.5
         return picture, 0.0, False, False, {}
 
 
@@ -199,7 +242,7 @@ class RareLeaf(Corridor):
 
     def step(self, action):
         if self.cell == 3 and action:
-            return self.moved(int(np.random.rand() < 0.5))  # noqa: NPY002
+            return self.moved(int(RAND() < 0.5))
         return self.moved(int(action))
 
 
@@ -213,7 +256,7 @@ class Draws(Corridor):
     """Draws from outside in every step, harmlessly."""
 
     def step(self, action):
-        np.random.rand()  # noqa: NPY002
+        RAND()
         return self.moved(int(action))
 
 

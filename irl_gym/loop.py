@@ -15,7 +15,6 @@ The true reward enters the table, the expert and the judging only; the learning 
 """
 
 import os
-import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -44,7 +43,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.logs import log_scalars, logged
-from irl_gym.minari_files import unkept
+from irl_gym.minari_files import dataset_name, unkept
 from irl_gym.places import place_of
 from irl_gym.planners import SB3, Agent, Planner
 from irl_gym.policies import Policy
@@ -298,9 +297,3 @@ class Loop:
 def _steps(policy: Policy) -> dict[str, int]:
     """Environment steps that a policy was trained on."""
     return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0}
-
-
-def dataset_name(env_id: str) -> str:
-    """The Minari id under which a run's demonstrations are kept."""
-    plain = re.sub(r"[^-\w]+", "-", env_id.split(":")[-1]).lower()
-    return f"irl_gym/{plain}-expert-v0"

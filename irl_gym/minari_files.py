@@ -9,6 +9,7 @@ import importlib.util
 import inspect
 import json
 import os
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -234,3 +235,9 @@ def publish(folder: Path, base: Path, dataset_id: str) -> None:
             (folder / _NAMESPACE).write_text("{}")
             os.replace(folder / _NAMESPACE, parent / _NAMESPACE)
     os.replace(folder / dataset_id, final)
+
+
+def dataset_name(env_id: str) -> str:
+    """The Minari id under which a run's demonstrations are kept."""
+    plain = re.sub(r"[^-\w]+", "-", env_id.split(":")[-1]).lower()
+    return f"irl_gym/{plain}-expert-v0"

@@ -2,10 +2,8 @@
 Axes: S states, A actions, n points of the learning curve, k pieces of the lambda path.
 """
 
-import contextlib
 import os
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +12,9 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.archives import json_in, read_arrays
-from irl_gym.claims import AGAIN, ENVIRONMENT, FIRST, STAGES, check_format, into_folder, ours, shell_command
+from irl_gym.claims import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
 from irl_gym.curves import Curve, read_curve
-from irl_gym.errors import InvalidInput, IrlGymError, RunIncomplete
+from irl_gym.errors import InvalidInput, RunIncomplete
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
@@ -25,14 +23,12 @@ from irl_gym.names import state_name
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import NOT_THE_SAME, START, SURPRISES, changed, read_json, read_record
+from irl_gym.run_folder import START, read_json, read_record
+from irl_gym.run_reader import RunReader
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
 from irl_gym.verified import recomputed
-
-ONCE = ("config.json", "run.json")
-"""Files that no stage writes: they are there from the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +123,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     if not (path / "config.json").is_file():
         raise RunIncomplete(f"{path} holds no run: expected a folder with a config.json. Name the --out of a run.")
     check_links(path)
-    reader = _Reader(path)
+    reader = RunReader(path)
     older = not (path / "run.json").exists()
     version: dict[str, Any] = {} if older else reader.read("run.json", read_json)
     check_format(path, version)
@@ -163,82 +159,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     return _with_proof(run, reader)
 
 
-@contextlib.contextmanager
-def understood(*paths: str | os.PathLike) -> Iterator[None]:
-    """For what is made of folders that anybody may have written: json that no run leaves is the run's fault, no traceback.
-
-    Args:
-        paths: the folders.
-
-    Raises:
-        RunIncomplete: in place of what the surprise raised, which it names.
-    """
-    try:
-        yield
-    except IrlGymError:
-        raise
-    except SURPRISES as error:
-        raise not_understood(error, *paths) from error
-
-
-def not_understood(error: Exception, *paths: str | os.PathLike) -> RunIncomplete:
-    """The error of folders whose files can be read and say what no run says."""
-    told = ", ".join(map(str, paths))
-    return RunIncomplete(
-        f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. If they "
-        "were changed, or another program wrote them, make the run again; if not, it is a defect of irl_gym: please report it."
-    )
-
-
-class _Reader:
-    """Reads files of one folder, and says which is wrong."""
-
-    def __init__(self, path: Path):
-        self.path, self.command = path, None
-
-    def incomplete(self, what: str) -> RunIncomplete:
-        """The error of a run that has to be continued."""
-        here = None if self.command is None else into_folder(self.command, str(self.path))
-        again = shell_command(here) or f"recover_and_retrain(experiment, {str(self.path)!r}) with the same experiment"
-        how = "The same command" if self.command is None or ours(self.command) else "A command of another program, it says,"
-        return RunIncomplete(f"{self.path} is incomplete: {what}: expected a finished run. {how} continues it: {again}")
-
-    def lost(self, what: str) -> RunIncomplete:
-        """The error of a run that cannot be continued, since what says which run it is is gone."""
-        again = shell_command(None if self.command is None else into_folder(self.command))
-        told = f"with another --out: {again}" if again else f"in a new folder: recover_and_retrain(experiment, {AGAIN!r})"
-        return RunIncomplete(
-            f"{self.path} is damaged: {what}: expected what the run wrote at its start, which no stage writes again. Make the "
-            f"run again, {told}"
-        )
-
-    def read(self, name: str, read: Callable[[Path], Any]) -> Any:
-        """The content of a file."""
-        try:
-            return read(self.path / name)
-        except FileNotFoundError as error:
-            missing = Path(error.filename or name)
-            told = missing.relative_to(self.path) if missing.is_relative_to(self.path) else name
-            raise self.incomplete(f"{told} is missing") from error
-        except (OSError, *SURPRISES, EOFError, zipfile.BadZipFile, IrlGymError) as error:
-            what = f"{name} cannot be read ({type(error).__name__}: {error})"
-            if name in ONCE:
-                raise self.lost(what) from error
-            raise self.incomplete(f"{what}; delete it, and its stage is run again") from error
-
-    def maybe(self, name: str, read: Callable[[Path], Any]) -> Any:
-        """The content of a file that not every run has."""
-        return self.read(name, read) if (self.path / name).exists() else None
-
-    def check(self, record: Mapping[str, Any]) -> None:
-        """Check that files are those that were recorded."""
-        name = changed(self.path, record)
-        if name is not None:
-            told = f"{name} {NOT_THE_SAME}"
-            raise self.lost(told) if name in ONCE else self.incomplete(f"{told}; delete it, and it is made again")
-
-
-def _environment(reader: _Reader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
+def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
     """Id, observation space and names of the actions, which are read: no environment is made on the word of a folder."""
     if (told := reader.maybe(ENVIRONMENT, _told)) is None:
         raise reader.incomplete(
@@ -253,7 +174,7 @@ def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
     return content["id"], told_space("observations", content["observations"]), tuple(map(str, content["actions"]))
 
 
-def _table(reader: _Reader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:
+def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:
     """The table that is kept, also of cells."""
     if config.get("bins") is not None and not (reader.path / TABLE).exists():
         raise reader.incomplete(
@@ -263,7 +184,7 @@ def _table(reader: _Reader, config: Mapping[str, Any], observations: spaces.Spac
     return reader.read(TABLE, lambda path: load_table(path, observations))
 
 
-def _check_shapes(run: Run, reader: _Reader) -> None:
+def _check_shapes(run: Run, reader: RunReader) -> None:
     """Check that rewards and policies are of the run's own table: a file may have been copied from another run.
 
     Raises:
@@ -289,7 +210,7 @@ def _check_shapes(run: Run, reader: _Reader) -> None:
             raise reader.incomplete(f"{what}; delete it, and its stage is run again")
 
 
-def _with_proof(run: Run, reader: _Reader) -> Run:
+def _with_proof(run: Run, reader: RunReader) -> Run:
     """The run with its reward's proof as its files give it now, where they do.
 
     Raises:

@@ -17,7 +17,8 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.page.comparison import lettered, write_comparison
 from irl_gym.page.pooled import told
 from irl_gym.pooling import pools
-from irl_gym.runs import Run, read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import Run, read_run
 from irl_gym.terminal import check_writable, print_error
 
 

@@ -15,7 +15,8 @@ from rich.text import Text
 
 from irl_gym import IrlGymError
 from irl_gym.page.report import write_report
-from irl_gym.runs import read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
 from irl_gym.terminal import OPTIONS, UNSET, check_writable, print_error
 
 

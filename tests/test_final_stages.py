@@ -17,7 +17,8 @@ from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
-from irl_gym.runs import read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
 
 ASKED = {"env_kwargs": {"is_slippery": False}, "episodes": 5, "eval_episodes": 5, "num_envs": 8}
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--out", "run")

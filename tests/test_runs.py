@@ -27,7 +27,8 @@ from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
-from irl_gym.runs import read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
 from irl_gym.worlds import load_actions
 
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")

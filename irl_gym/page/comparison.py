@@ -26,7 +26,8 @@ from irl_gym.page.worlds import one_world, run_places, run_title
 from irl_gym.page.written import counted, number, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.run_folder import SURPRISES
-from irl_gym.runs import Run, not_understood
+from irl_gym.run_reader import not_understood
+from irl_gym.runs import Run
 from irl_gym.shares import judged
 
 SCRIPTS = ("theme.js", "figures.js")

@@ -25,7 +25,8 @@ from irl_gym.page.report import write_report
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder
-from irl_gym.runs import read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
 from irl_gym.shards import Shards
 from irl_gym.states import StateIndex
 from irl_gym.table_files import load_table, save_table

@@ -41,8 +41,9 @@ def render(report: Report) -> Iterator[RenderableType]:
     yield _reward(report)
     yield _stages(report)
     yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics, figures and films."
-    if report.stages["demonstrations"].get("no_environment"):
-        yield Text(report.stages["demonstrations"]["no_environment"])
+    lost = report.stages.get("demonstrations", {}).get("no_environment")
+    if lost:
+        yield Text(lost)
     yield from _doctor(report)
     yield f"Open {report.page} in a browser."
 

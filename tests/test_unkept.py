@@ -7,9 +7,11 @@ from gymnasium import spaces
 
 from irl_gym.closing import close
 from irl_gym.datasets import load_minari
+from irl_gym.demonstrators import Recording
 from irl_gym.errors import RunConflict
 from irl_gym.experiment import Experiment, as_config
 from irl_gym.features import OneHot
+from irl_gym.keyboard import controls_of
 from irl_gym.linear_reward import LinearReward
 from irl_gym.loop import Loop
 from irl_gym.minari_files import unkept
@@ -17,6 +19,7 @@ from irl_gym.page.again import missing, python_lines
 from irl_gym.page.asked import asked
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
+from irl_gym.playing import Play, learn_command, write_played
 from irl_gym.report import render
 from irl_gym.run_folder import read_json
 from irl_gym.runs import read_run
@@ -132,3 +135,18 @@ def test_what_did_not_close_is_not_asked_again():
     vector = gym.vector.SyncVectorEnv([lambda: gym.make("Plain-v0")])
     close(vector)
     assert vector.closed
+
+
+def test_an_export_knows_an_environment_by_what_it_was_made_with():
+    plans = [Recording("random", 0.9).plan(gym.make("Plain-v0", thing=Thing(size)))["environment"] for size in (3, 3, 4)]
+    assert plans[0] == plans[1] != plans[2] and plans[0]["kwargs"]["thing"]["object"].endswith("Thing")
+
+
+def test_a_game_is_written_and_its_command_names_the_environment(tmp_path):
+    env = gym.make("Filled-v0")
+    play = Play(env, controls_of(env), 1, keep_unfinished=True)
+    play.start()
+    play.press("0")
+    play.stop()
+    assert "no json" in write_played(play, "me/filled-v0", env, str(tmp_path)).storage.metadata["description"]
+    assert "--env-id Filled-v0" in learn_command("me/filled-v0", None, "Filled-v0")

@@ -25,7 +25,7 @@ from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
 from irl_gym.page.slider import MOST_PIECES
 from irl_gym.run_folder import write_json
-from irl_gym.runs import read_run
+from irl_gym.runs import read_run, understood
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
@@ -136,6 +136,6 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
 def report(loop: "Loop", folder: Path) -> dict[str, Any]:
     """Write the page, from what is on disk; the table is at hand."""
     table = loop.world.table if isinstance(loop.world, TableWorld) else None
-    run = read_run(loop.folder.path, table)
-    write_report(run, folder / "report.html")
+    with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
+        write_report(read_run(loop.folder.path, table), folder / "report.html")
     return {}

@@ -42,9 +42,10 @@ def no_agent(monkeypatch):
     monkeypatch.setattr(experts, "load_agent", refused)
 
 
-def fuzz(name, finished, folder, inputs):
+def fuzz(name, request, folder, inputs):
     reader = READERS[name]
     if "run" in name:
+        finished = request.getfixturevalue("finished")
         shutil.copytree(finished, folder / "run")
         shutil.copy(finished / "config.json", folder)
         folder = folder / "run"
@@ -72,19 +73,17 @@ def fuzz(name, finished, folder, inputs):
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_a_changed_file_is_refused_by_an_error_of_ours_or_read_as_something_sound(
-    name, finished, tmp_path, no_agent, unchecked
-):
-    fuzz(name, finished, tmp_path, int(SMALL * READERS[name].weight / TOTAL))
+def test_a_changed_file_is_refused_by_an_error_of_ours_or_read_as_something_sound(name, request, tmp_path, no_agent, unchecked):
+    fuzz(name, request, tmp_path, int(SMALL * READERS[name].weight / TOTAL))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 def test_each_of_100_000_inputs_is_refused_by_an_error_of_ours_or_read_as_something_sound(
-    name, finished, tmp_path, no_agent, unchecked
+    name, request, tmp_path, no_agent, unchecked
 ):
     forget_peak()
-    fuzz(name, finished, tmp_path, int(MANY * READERS[name].weight / TOTAL))
+    fuzz(name, request, tmp_path, int(MANY * READERS[name].weight / TOTAL))
     assert peak() < 1e9
 
 

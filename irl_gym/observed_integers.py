@@ -56,7 +56,8 @@ def _integers(space: spaces.Space, seen: list[Any], name: str, place: str) -> tu
     """Code that shows an observation `name` as integers, and the space of these; None where nothing does."""
     if isinstance(space, spaces.Tuple | spaces.Dict):
         keys = space.spaces if isinstance(space, spaces.Dict) else range(len(space.spaces))
-        parts = [_integers(space[key], [one[key] for one in seen], f"{name}[{key!r}]", f"{place}[{key!r}]") for key in keys]
+        within: Any = space
+        parts = [_integers(within[key], [one[key] for one in seen], f"{name}[{key!r}]", f"{place}[{key!r}]") for key in keys]
         if None in parts or not parts:
             return None
         functions, kinds = zip(*(part for part in parts if part is not None), strict=True)

@@ -170,8 +170,9 @@ def _attribute(env: gym.Env, name: str) -> Any:
                 raise _no_attribute(type(value).__name__, attribute, [value])
             value = getattr(value, attribute)
             continue
+        holder: Any = value
         try:
-            value = value[ast.literal_eval(item)]
+            value = holder[ast.literal_eval(item)]
         except (LookupError, TypeError) as error:
             raise InvalidParameter(
                 f"{name[: part.start()]} has no part [{item}] ({type(error).__name__}: {error}): expected one that it has. It "

@@ -52,7 +52,9 @@ def done(code, env):
     import irl_gym.reveal
     import irl_gym.seeded_starts
 
-    return eval(code, {"env": env, "gamma": GAMMA, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy})
+    return eval(
+        code, {"env": env, "gamma": GAMMA, "discretize": discretize, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy}
+    )
 
 
 def error_of(env, error, **options):
@@ -184,6 +186,23 @@ def test_a_hidden_float_is_counted_on_average():
     env = Drifts()
     message = error_of(env, HiddenState)
     assert "drift: " in message and not done(mends(message)[-1], env).evidence.exact
+
+
+class Cells(gymnasium.ObservationWrapper):
+    """MountainCar, seen in 20 x 20 cells."""
+
+    def __init__(self):
+        super().__init__(gymnasium.make("MountainCar-v0"))
+        self.observation_space = spaces.MultiDiscrete([20, 20])
+
+    def observation(self, observation):
+        return np.clip((observation + np.array([1.2, 0.07])) / [1.8, 0.14] * 20, 0, 19).astype(np.int64)
+
+
+def test_a_continuous_state_that_cells_hide_is_sent_to_cells_of_its_own():
+    env = Cells()
+    message = error_of(env, HiddenState, by=Enumeration(start_runs=300, runs=50))
+    assert done(mends(message)[0], env).mdp.n_states >= 400
 
 
 # --- observations ---

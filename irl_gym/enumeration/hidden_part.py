@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from irl_gym.coordinates import IntegerCoordinate
 from irl_gym.copies.object_graphs import Difference, Steps
 from irl_gym.enumeration.hidden_state import unlike
 from irl_gym.enumeration.outside import OutsideRandomness
 from irl_gym.errors import IrlGymError
+from irl_gym.physics import physics_of
 from irl_gym.reveal import can_be_shown, known_hidden
 
 if TYPE_CHECKING:
@@ -58,6 +60,8 @@ class HiddenPart:
         count = "count what happens on average, with `irl_gym.tabulate(env, gamma=gamma, by=irl_gym.counting.Interaction())`"
         if reveal:
             return f"Show what is hidden in the observation, with {reveal}; or {count}."
+        if _continuous(env):
+            return f"Make cells of the state itself, with `discretize(env.unwrapped, gamma=gamma, bins=20)`; or {count}."
         return (
             "To show what is hidden in the observation, give the environment an integer attribute that says it, and name that, "
             f'as in `irl_gym.reveal.Reveal(env, {{"name": 2}})` for two values; or {count}.'
@@ -67,6 +71,14 @@ class HiddenPart:
         """What `Reveal` is given; empty where it cannot show each cause."""
         shown = {one.name: _values(one) for one in self.causes}
         return shown if len(shown) <= MOST_TOLD and all(can_be_shown(name) and n for name, n in shown.items()) else {}
+
+
+def _continuous(env: Any) -> bool:
+    """Can the state of the environment inside be set, and is it of floats?"""
+    try:
+        return not isinstance(physics_of(env.unwrapped).coordinates, IntegerCoordinate)
+    except (IrlGymError, LookupError, TypeError, ValueError, AttributeError):
+        return False
 
 
 def _values(part: Difference) -> int | list[Any] | None:

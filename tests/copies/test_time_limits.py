@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from enumeration_envs import Corridor
 from gymnasium import spaces
-from gymnasium.wrappers import StickyAction, TimeAwareObservation, TimeLimit, TransformReward
+from gymnasium.wrappers import RepeatAction, StickyAction, TimeAwareObservation, TimeLimit, TransformReward
 
+from irl_gym.copies.time_limits import check_limits
 from irl_gym.counting import Interaction
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import NotTabular, UnknownObservation
@@ -109,7 +110,6 @@ def test_an_observation_out_of_its_space_names_the_limit_that_was_left_out():
         Enumeration().table(Counts(limited()), 0.9)
 
 
-def test_sticky_actions_do_not_read_the_limit():
-    from irl_gym.copies.time_limits import check_limits
-
-    check_limits(StickyAction(limited(), 0.25))
+@pytest.mark.parametrize("around", [lambda env: StickyAction(env, 0.25), lambda env: RepeatAction(env, 3)])
+def test_wrappers_that_repeat_actions_do_not_read_the_limit(around):
+    check_limits(around(limited()))

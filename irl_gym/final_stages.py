@@ -25,7 +25,8 @@ from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
 from irl_gym.page.slider import MOST_PIECES
 from irl_gym.run_folder import write_json
-from irl_gym.runs import read_run, understood
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:

@@ -12,32 +12,15 @@ import gymnasium as gym
 import minari
 import numpy as np
 import pytest
+from numbered import Numbered
 
 from irl_gym import export
 from irl_gym.datasets import described, minari_root, read_minari
-from irl_gym.demonstrations import Episode
 from irl_gym.errors import DatasetExists, InvalidDemonstrations, InvalidParameter, RunConflict
 from irl_gym.export import Amount, export_dataset
 
 ID = "lake/some/expert-v0"
 ENV = gym.make("FrozenLake-v1")
-
-
-class Numbered:
-    """Episode i has 1 + i % 3 steps, and is drawn from i."""
-
-    def __init__(self, breaks_at=None, least=1):
-        self.breaks_at, self.least, self.asked = breaks_at, least, []
-
-    def episodes(self, first):
-        i = first
-        while True:
-            if i == self.breaks_at:
-                raise KeyboardInterrupt
-            self.asked.append(i)
-            rng, steps = np.random.default_rng(i), self.least + i % 3
-            yield Episode(rng.integers(16, size=steps + 1), rng.integers(4, size=steps), rng.random(steps), True, False, i)
-            i += 1
 
 
 def run(root, demonstrator=None, *, amount=None, plan=None, dataset_id=ID, data_format="hdf5", begin=None, on_progress=None):

@@ -4,15 +4,14 @@ import re
 import threading
 
 import gymnasium
-import numpy
 import numpy as np
 import pytest
 from enumeration_envs import Corridor
 from gymnasium import spaces
 from gymnasium.wrappers import StickyAction
+from mended import GAMMA, SHOWN, Shows, done, error_of, mends, revealed
 
-from irl_gym.counting import Interaction, interact
-from irl_gym.discretize import discretize
+from irl_gym.counting import Interaction
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import (
     EnvironmentFailed,
@@ -23,66 +22,17 @@ from irl_gym.errors import (
     NotCopied,
     NotDiscrete,
     NotTabular,
-    UnknownObservation,
 )
 from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.minari_files import identity
 from irl_gym.places import place_of
-from irl_gym.planners import ValueIteration
 from irl_gym.policies import as_distribution
-from irl_gym.reveal import Reveal
 from irl_gym.seeded_starts import SeededStarts
-from irl_gym.simulator import Simulator
 from irl_gym.tabulate import make, tabulate
 
 pytestmark = pytest.mark.usefixtures("unchecked")
-GAMMA = 0.9
-
-
-def mends(message):
-    """The code that a message names, in its order."""
-    return re.findall(r"`([^`]*)`", message)
-
-
-def done(code, env):
-    """What a mend makes."""
-    import irl_gym.counting
-    import irl_gym.reveal
-    import irl_gym.seeded_starts
-
-    return eval(
-        code, {"env": env, "gamma": GAMMA, "discretize": discretize, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy}
-    )
-
-
-def error_of(env, error, **options):
-    with pytest.raises(error) as caught:
-        tabulate(env, gamma=GAMMA, **options)
-    return str(caught.value)
-
-
-def revealed(env):
-    """The environment with all that its errors say to reveal, and their mends where a value was not counted."""
-    shown = {}
-    for _ in range(20):
-        try:
-            tabulate(Reveal(env, shown) if shown else env, gamma=GAMMA, check_steps=500)
-            return Reveal(env, shown)
-        except HiddenState as error:
-            code = next(one for one in mends(str(error)) if one.startswith("irl_gym.reveal.Reveal"))
-            shown |= done(code, env).shown
-        except UnknownObservation as error:
-            more = re.search(r"shown=(\{.*?\})", str(error))
-            if more is None:  # a listed value: "List it too"
-                name, value = re.match(r"(\S+) is (.*?): expected one of", str(error)).groups()
-                shown[name] = [*shown[name], eval(value)]
-            else:
-                shown |= eval(more[1])
-    raise AssertionError("the mends lead nowhere")
-
-
 # --- what is hidden ---
 
 
@@ -203,100 +153,6 @@ def test_a_continuous_state_that_cells_hide_is_sent_to_cells_of_its_own():
     env = Cells()
     message = error_of(env, HiddenState, by=Enumeration(start_runs=300, runs=50))
     assert done(mends(message)[0], env).mdp.n_states >= 400
-
-
-# --- observations ---
-
-
-class Shows(Corridor):
-    """Shows its cell in some other way."""
-
-    def __init__(self, space, show):
-        super().__init__()
-        self.observation_space, self.show = space, show
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return self.show(self.cell), {}
-
-    def step(self, action):
-        _, *rest = self.moved(int(action))
-        return self.show(self.cell), *rest
-
-
-WORDS = ["first", "second", "third", "fourth", "fifth", "sixth", "last"]
-SHOWN = {
-    "whole numbers as floats": (spaces.Box(0, 6, (2,), np.float32), lambda cell: np.array([cell, 0], np.float32)),
-    "floats without bounds": (spaces.Box(-np.inf, np.inf, (), np.float64), np.float64),
-    "words": (spaces.Text(6), WORDS.__getitem__),
-    "a dict with a word": (
-        spaces.Dict({"cell": spaces.Discrete(7), "word": spaces.Text(6)}), lambda cell: {"cell": cell, "word": WORDS[cell]}
-    ),
-    "a tuple with a float": (
-        spaces.Tuple([spaces.Box(0, 6, (1,)), spaces.MultiBinary(1)]),
-        lambda cell: (np.array([cell], np.float32), np.zeros(1, np.int8)),
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", SHOWN)
-@pytest.mark.parametrize("by", [None, Interaction(500)], ids=["enumerated", "counted"])
-def test_observations_that_are_whole_numbers_or_words_are_shown_as_integers(name, by):
-    env = Shows(*SHOWN[name])
-    message = error_of(env, NotDiscrete, by=by)
-    assert tabulate(done(mends(message)[0], env), gamma=GAMMA, by=by).mdp.n_states == 7
-
-
-def test_observations_that_are_not_whole_are_sent_to_cells():
-    env = Shows(spaces.Box(0, 6, (1,), np.float64), lambda cell: np.array([cell / 4]))
-    assert mends(error_of(env, NotDiscrete))[0].startswith("discretize(env")
-
-
-# --- actions ---
-
-
-class Does(Corridor):
-    """Is told in some other way where to go."""
-
-    def __init__(self, space, read):
-        super().__init__()
-        self.action_space, self.read, self.state = space, read, None
-
-    def step(self, action):
-        assert self.action_space.contains(action)
-        return self.moved(self.read(action))
-
-
-ACTIONS = {
-    "several": (spaces.MultiDiscrete([2, 3]), lambda a: int(a[0])),
-    "several from others": (spaces.MultiDiscrete([2, 3], start=[-1, 4]), lambda a: int(a[0]) + 1),
-    "a map of several": (spaces.MultiDiscrete([[2, 2], [2, 1]]), lambda a: int(a[0, 1])),
-    "bits": (spaces.MultiBinary(3), lambda a: int(a[1])),
-    "numbers": (spaces.Box(-1, 1, (1,)), lambda a: int(a[0] > 0)),
-    "numbers without bounds": (spaces.Box(-np.inf, np.inf, (2,)), lambda a: int(a[1] > 0)),
-}
-ASKED = {
-    "tabulate": lambda env: tabulate(env, gamma=GAMMA),
-    "interact": lambda env: list(interact(env, 20, seed=0)),
-    "Simulator": lambda env: Simulator(env, ValueIteration(), GAMMA).known,
-}
-
-
-@pytest.mark.parametrize("name", ACTIONS)
-@pytest.mark.parametrize("asked", ASKED)
-@pytest.mark.filterwarnings("ignore:.*MultiDiscrete")
-def test_actions_that_are_no_single_number_are_made_one(name, asked):
-    env = Does(*ACTIONS[name])
-    with pytest.raises((NotDiscrete, InvalidParameter), match="expected Discrete") as caught:
-        ASKED[asked](env)
-    assert ASKED[asked](done(mends(str(caught.value))[0], env))
-
-
-def test_actions_that_are_numbered_as_the_error_says_make_a_table_of_cells():
-    env = gymnasium.make("Pendulum-v1")
-    with pytest.raises(NotDiscrete) as caught:
-        discretize(env, gamma=GAMMA, bins=3)
-    assert discretize(done(mends(str(caught.value))[0], env), gamma=GAMMA, bins=3).mdp.n_actions == 5
 
 
 # --- generators, constructors, rows ---

@@ -9,27 +9,18 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from forgetting import without_digests
-from gymnasium import spaces
-from tiny_env import TableEnv, lottery
 
 from irl_gym.claims import write_environment
-from irl_gym.curves import Curve, read_curve, sampled_returns, write_curve
 from irl_gym.errors import RunConflict, RunIncomplete, RunNewer
 from irl_gym.experiment import Experiment
 from irl_gym.layouts import grid_layout
-from irl_gym.linear_reward import load_reward
-from irl_gym.listed_states import ListedStates, usual_observation
 from irl_gym.loop import Loop
-from irl_gym.metrics import policy_value
-from irl_gym.names import action_names, state_name
-from irl_gym.page.proof import verdict
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
-from irl_gym.worlds import load_actions
 
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
@@ -240,54 +231,6 @@ def test_a_format_that_is_no_newer_one_is_refused_without_an_upgrade(copied, tol
         read_run(copied)
 
 
-# --- files that are not the run's own ---
-
-
-def negated(path):
-    one = load_reward(path / "reward.npz")
-    TabularReward(-one.values, one.note).save(path / "reward.npz")
-
-
-def rolled(path):
-    np.savez(path / "expert.npz", actions=np.roll(load_actions(path / "expert.npz"), 1))
-
-
-def discounted(path):
-    with np.load(path / "table.npz") as archive:
-        arrays = dict(archive)
-    np.savez(path / "table.npz", **{**arrays, "gamma": np.array(0.5)})
-
-
-@pytest.mark.parametrize(
-    ("swap", "found"), [(negated, "as recorded"), (rolled, "as recorded"), (discounted, r"gamma 0\.5: expected 0\.99")]
-)
-def test_a_run_whose_files_do_not_bear_out_its_record_is_refused(copied, swap, found):
-    swap(copied)
-    with pytest.raises(RunIncomplete, match=f"table, expert and reward do not bear out its record: .*{found}"):
-        read_run(copied)
-
-
-def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(copied, finished):
-    negated(copied)
-    for name in ("table.npz", "expert.npz", "reward.npz"):
-        (copied / name).unlink()
-    recover_and_retrain(asked(), copied)
-    assert read_run(copied).recomputed and np.array_equal(read_run(copied).learned.values, read_run(finished).learned.values)
-
-
-def test_what_is_said_of_the_expert_is_computed_and_not_read(copied, run):
-    content = read_json(copied / "metrics.json")
-    write_json(copied / "metrics.json", content | {"reward": content["reward"] | {"expert_optimal": False}})
-    assert read_run(copied).metrics["reward"] == run.metrics["reward"] and run.recomputed
-
-
-def test_a_record_that_cannot_be_computed_again_is_told_as_one(copied):
-    content = read_json(copied / "metrics.json")
-    write_json(copied / "metrics.json", content | {"reward": content["reward"] | {"learner": "Theirs"}})
-    run = read_run(copied)
-    assert not run.recomputed and "by the run's own record" in verdict(run)["sentence"]
-
-
 # --- runs of earlier versions ---
 
 
@@ -325,56 +268,3 @@ def test_a_run_of_an_earlier_version_gets_the_new_stages_only(older):
         "report",
     ]
     assert set(read_run(older).films) == {"expert", "agent"} and made.page.exists()
-
-
-# --- the parts ---
-
-
-def test_sampled_returns_have_the_mean_that_the_table_says(toy_text):
-    table = toy_text("FrozenLake 4x4 slippery")
-    policies = [np.full(16, 1), np.full(16, 2)]
-    found = sampled_returns(table, policies, 4_000, limit=100, seed=0)
-    undiscounted = type(table.mdp)(table.mdp.P, 1 - 1e-9, table.mdp.d0)
-    for returns, policy in zip(found, policies, strict=True):
-        error = returns.std() / np.sqrt(returns.size)
-        assert abs(returns.mean() - policy_value(undiscounted, table.reward, policy, horizon=100)) < 4 * error
-
-
-def test_a_curve_is_read_as_it_was_written(tmp_path):
-    curve = Curve(*np.random.default_rng(0).random((5, 7)).round(12))
-    write_curve(Curve(np.arange(7.0), curve.value, curve.mean, curve.low, curve.high), tmp_path / "curve.csv")
-    again = read_curve(tmp_path / "curve.csv")
-    assert np.array_equal(again.steps, np.arange(7)) and np.array_equal(again.high, curve.high)
-
-
-@pytest.mark.parametrize(
-    ("env_id", "observation", "name"),
-    [
-        ("Taxi-v4", 328, "taxi 3, 1; passenger at Y, to R"),
-        ("Blackjack-v1", {"natural": 1, "observation": (21, 1, 1)}, "21 with an ace against ace, natural 1"),
-        ("Deck-v0", (3, 1), "(3, 1)"),
-        ("CartPole-v1", np.array([0.01234, -1.0, 0, 0], dtype=np.float32), "(0.0123, -1, 0, 0)"),
-        (None, np.zeros((7, 7, 3), dtype=np.uint8), "7 x 7 x 3 numbers, all 0"),
-        (None, np.eye(5, dtype=np.int8)[[1, 0, 0, 0, 0]] * 2, "5 x 5 numbers: 2 at [0, 1], 2 at [1, 0], 2 at [2, 0], 2 more"),
-        (None, np.zeros(9, dtype=np.float32), "9 numbers"),
-    ],
-)
-def test_a_state_is_called_by_its_observation(env_id, observation, name):
-    assert state_name(env_id, observation) == name
-
-
-def test_states_of_many_numbers_are_called_by_what_differs():
-    maps = np.tile(np.arange(25).reshape(5, 5) % 3, (4, 1, 1)).reshape(4, 25)
-    maps[np.arange(4), [3, 7, 11, 24]] = 9
-    states = ListedStates(spaces.Box(0, 9, (5, 5), np.int8), maps[np.lexsort(maps.T[::-1])])
-    names = [state_name(None, states.decode(row), usual=usual_observation(states)) for row in range(4)]
-    assert sorted(names) == [f"5 x 5 numbers: 9 at {place}" for place in ([0, 3], [1, 2], [2, 1], [4, 4])]
-
-
-def test_parts_of_many_numbers_are_called_by_what_differs():
-    usual = {"map": np.zeros(9, dtype=np.int8), "key": 0}
-    assert state_name(None, {"map": np.eye(9, dtype=np.int8)[4], "key": 1}, usual=usual) == "map 9 numbers: 1 at [4], key 1"
-
-
-def test_actions_that_nobody_named_are_numbered():
-    assert action_names(TableEnv(lottery(0.5), [1.0])) == ("action 0",)

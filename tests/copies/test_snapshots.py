@@ -1,7 +1,5 @@
 import collections
-import re
 import threading
-import types
 
 import gym_classics
 import gymnasium as gym
@@ -12,9 +10,6 @@ import numpy as np
 import pytest
 from minigrid.wrappers import FullyObsWrapper, ImgObsWrapper
 from walk_env import Bag, StandIn, Walk, frames, snapshots_of
-
-from irl_gym.copies.snapshots import ConstantChanged
-from irl_gym.errors import InvalidParameter
 
 if gym_classics._backend is None:  # a second call warns
     gym_classics.register("gymnasium")
@@ -171,106 +166,6 @@ def test_snapshot_copies_what_cannot_be_pickled():
         assert walk(env, snapshots, actions) == first
         env.inner.n = 6
     assert type(env.np_random) is StandIn
-
-
-def test_large_attributes_that_do_not_change_are_left_out_and_guarded():
-    env, snapshots = snapshots_of(Walk(map=list(range(2000))))
-    assert len(snapshots.take()) < 300
-    assert snapshots.changed_constants() == []
-    env.map[3] = 0
-    assert snapshots.changed_constants() == ["map"]
-
-
-def test_take_notices_a_constant_bound_to_another_object():
-    env, snapshots = snapshots_of(Walk(map=list(range(2000))))
-    env.map = list(range(1, 2001))
-    with pytest.raises(ConstantChanged, match="map"):
-        snapshots.take()
-    assert snapshots.changed_constants() == ["map"]
-
-
-def world(**more):
-    """An attribute with a large part that never changes, and one that grows."""
-    return {"map": [[r + c for c in range(70)] for r in range(70)], "path": [], **more}
-
-
-class Grows(Walk):
-    def step(self, action):
-        path = self.world["path"] if isinstance(self.world, dict) else self.world.path
-        path.append(action)
-        return super().step(action)
-
-
-@pytest.mark.parametrize("made", [world, lambda: types.SimpleNamespace(**world())], ids=["dict", "object"])
-def test_a_large_part_of_an_attribute_is_left_out_beside_one_that_grows(made):
-    env, snapshots = snapshots_of(Grows(world=made()))
-    env.step(1)
-    state, before = snapshots.take(), str(env.world)
-    env.step(0)
-    snapshots.restore(state)
-    assert (len(state) < 500, str(env.world)) == (True, before)
-
-
-def test_a_part_of_an_attribute_that_is_changed_in_place_is_noticed_and_can_be_included():
-    env, snapshots = snapshots_of(Grows(world=world()))
-    env.world["map"][3][4] = -1
-    assert snapshots.changed_constants() == ["world['map']"]
-    snapshots.include(["world['map']"])
-    state = snapshots.take()
-    env.world["map"][3][4] = -2
-    snapshots.restore(state)
-    assert (env.world["map"][3][4], snapshots.changed_constants()) == (-1, [])
-
-
-@pytest.mark.parametrize("change", [{"map": [1]}, {"map": None}, {}], ids=["other", "none", "gone"])
-def test_take_notices_another_part_in_the_place_of_a_constant(change):
-    env, snapshots = snapshots_of(Grows(world=world()))
-    env.world = {"path": [], **change}
-    with pytest.raises(ConstantChanged, match=re.escape("world['map']")):
-        snapshots.take()
-
-
-def test_a_constant_that_is_built_anew_with_the_same_contents_stays_one_with_what_it_shares():
-    env, snapshots = snapshots_of(Grows(world=world(), row=None))
-    env.world = world()
-    env.row = env.world["map"][3]
-    state = snapshots.take()
-    env.row = env.world = None
-    snapshots.restore(state)
-    assert (len(state) < 500, env.row is env.world["map"][3], len(env.world["map"])) == (True, True, 70)
-    env.row[0] = -1
-    assert snapshots.changed_constants() == ["world['map']"]
-
-
-def test_include_puts_a_constant_into_the_state():
-    env, snapshots = snapshots_of(Walk(map=list(range(2000))))
-    snapshots.include(["map"])
-    state = snapshots.take()
-    env.map[3] = 0
-    snapshots.restore(state)
-    assert (env.map[3], snapshots.changed_constants()) == (3, [])
-
-
-def test_include_refuses_a_name_that_is_no_attribute():
-    _, snapshots = snapshots_of(Walk())
-    with pytest.raises(InvalidParameter, match="name='mop' is no attribute"):
-        snapshots.include(["mop"])
-
-
-def test_an_attribute_may_share_an_object_of_a_constant():
-    env, snapshots = snapshots_of(Walk(rooms=[Bag([i]) for i in range(400)], room=None))
-    env.room = env.rooms[3]
-    state = snapshots.take()
-    env.room = None
-    snapshots.restore(state)
-    assert env.room is env.rooms[3]
-    env.room.items.append(4)  # through the state, into the constant
-    assert snapshots.changed_constants() == ["rooms"]
-    snapshots.include(["rooms"])
-    state = snapshots.take()
-    env.room.items.append(5)
-    snapshots.restore(state)
-    assert (env.room is env.rooms[3], env.room.items) == (True, [3, 4])
 
 
 def test_an_object_of_minigrids_that_is_carried_stays_that_of_its_grid():

@@ -3,77 +3,20 @@
 from dataclasses import replace
 from itertools import count
 
-import models
 import numpy as np
 import pytest
-from gymnasium import spaces
+from chain_world import GAMMA, Chain
 from scipy.optimize import linprog
 
 from irl_gym import deadline
 from irl_gym.demonstrations import Episode
-from irl_gym.dynamic_programming import occupancy, value_iteration
 from irl_gym.errors import InvalidDemonstrations, SolverTimeout
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import Functions, OneHot, Table
 from irl_gym.generative import least_horizon
 from irl_gym.learners.estimates import usable
 from irl_gym.learners.trajectory import TrajectoryLP
-from irl_gym.policies import TabularPolicy, as_distribution
-from irl_gym.rewards import TabularReward
-from irl_gym.sampling import Successors
 from irl_gym.solvers import Status
-from irl_gym.states import StateIndex
-
-GAMMA = 0.9
-
-
-class Chain:
-    """A world on a random MDP with two ends, that keeps what it was asked."""
-
-    gamma = GAMMA
-
-    def __init__(self, seed=0, S=8):
-        self.model = models.episodic_model(seed, S, 3, GAMMA)
-        self.states = StateIndex(spaces.Discrete(S))
-        self.asked, self.seen = [], []
-
-    def policy(self, R):
-        mdp = self.model.mdp
-        actions = value_iteration(mdp, TabularReward(R)).policy
-        return TabularPolicy(as_distribution(actions, mdp.n_states, mdp.n_actions), self.states)
-
-    def plan(self, reward, *, seed=0):
-        self.asked.append(reward.alpha)
-        return self.policy(reward.tabular(self.states).values)
-
-    def episodes(self, policy, n, *, horizon=400, seed=0):
-        """n episodes, cut after `horizon` steps; all are stepped together."""
-        mdp, rng = self.model.mdp, np.random.default_rng(seed)
-        successors, best = Successors(mdp), None if policy is None else policy.probabilities.argmax(axis=1)
-        rows, taken = [successors.start(n, rng)], []
-        while len(taken) < horizon and not mdp.terminal[rows[-1]].all():
-            going = ~mdp.terminal[rows[-1]]
-            taken.append(rng.integers(3, size=n) if best is None else best[rows[-1]])
-            rows.append(rows[-1].copy())
-            rows[-1][going] = successors.draw(rows[-2][going], taken[-1][going], rng)
-        visited, actions = np.array(rows).T, np.array(taken).T
-        ended = mdp.terminal[visited]
-        steps = np.where(ended.any(axis=1), ended.argmax(axis=1), len(taken))
-        parts = zip(visited, actions, steps, ended, strict=True)
-        return [Episode(v[: t + 1], a[:t], np.zeros(t), bool(e.any()), not e.any()) for v, a, t, e in parts]
-
-    def sums(self, policy, features, n, *, horizon, seed):
-        self.seen.append(discounted_sums(self.episodes(policy, n, horizon=horizon, seed=seed), features, GAMMA))
-        return self.seen[-1]
-
-    def expert(self, n=100, seed=1000, **kwargs):
-        return self.episodes(self.policy(self.model.R), n, seed=seed, **kwargs)
-
-    def exact(self, policy, phi):
-        """(K,) the value of a policy in the features."""
-        mdp = self.model.mdp
-        taken = occupancy(mdp, np.full((mdp.n_states, 3), 1 / 3) if policy is None else policy.probabilities)
-        return (taken.sum(axis=1) + np.where(mdp.terminal, mdp.gamma * (mdp.P.T @ taken.ravel()), 0)) @ phi
 
 
 def learner(**kwargs):

@@ -1,0 +1,93 @@
+"""Mends as errors name them: what stands between backquotes, evaluated."""
+
+import re
+
+import gymnasium
+import numpy
+import numpy as np
+import pytest
+from enumeration_envs import Corridor
+from gymnasium import spaces
+
+from irl_gym.discretize import discretize
+from irl_gym.errors import (
+    HiddenState,
+    UnknownObservation,
+)
+from irl_gym.reveal import Reveal
+from irl_gym.tabulate import tabulate
+
+GAMMA = 0.9
+
+
+def mends(message):
+    """The code that a message names, in its order."""
+    return re.findall(r"`([^`]*)`", message)
+
+
+def done(code, env):
+    """What a mend makes."""
+    import irl_gym.counting
+    import irl_gym.reveal
+    import irl_gym.seeded_starts
+
+    return eval(
+        code, {"env": env, "gamma": GAMMA, "discretize": discretize, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy}
+    )
+
+
+def error_of(env, error, **options):
+    with pytest.raises(error) as caught:
+        tabulate(env, gamma=GAMMA, **options)
+    return str(caught.value)
+
+
+def revealed(env):
+    """The environment with all that its errors say to reveal, and their mends where a value was not counted."""
+    shown = {}
+    for _ in range(20):
+        try:
+            tabulate(Reveal(env, shown) if shown else env, gamma=GAMMA, check_steps=500)
+            return Reveal(env, shown)
+        except HiddenState as error:
+            code = next(one for one in mends(str(error)) if one.startswith("irl_gym.reveal.Reveal"))
+            shown |= done(code, env).shown
+        except UnknownObservation as error:
+            more = re.search(r"shown=(\{.*?\})", str(error))
+            if more is None:  # a listed value: "List it too"
+                name, value = re.match(r"(\S+) is (.*?): expected one of", str(error)).groups()
+                shown[name] = [*shown[name], eval(value)]
+            else:
+                shown |= eval(more[1])
+    raise AssertionError("the mends lead nowhere")
+
+
+class Shows(Corridor):
+    """Shows its cell in some other way."""
+
+    def __init__(self, space, show):
+        super().__init__()
+        self.observation_space, self.show = space, show
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.show(self.cell), {}
+
+    def step(self, action):
+        _, *rest = self.moved(int(action))
+        return self.show(self.cell), *rest
+
+
+WORDS = ["first", "second", "third", "fourth", "fifth", "sixth", "last"]
+SHOWN = {
+    "whole numbers as floats": (spaces.Box(0, 6, (2,), np.float32), lambda cell: np.array([cell, 0], np.float32)),
+    "floats without bounds": (spaces.Box(-np.inf, np.inf, (), np.float64), np.float64),
+    "words": (spaces.Text(6), WORDS.__getitem__),
+    "a dict with a word": (
+        spaces.Dict({"cell": spaces.Discrete(7), "word": spaces.Text(6)}), lambda cell: {"cell": cell, "word": WORDS[cell]}
+    ),
+    "a tuple with a float": (
+        spaces.Tuple([spaces.Box(0, 6, (1,)), spaces.MultiBinary(1)]),
+        lambda cell: (np.array([cell], np.float32), np.zeros(1, np.int8)),
+    ),
+}  # fmt: skip

@@ -178,8 +178,14 @@ def read_statistics(path: str | os.PathLike) -> Normaliser:
     path = Path(path)
     if not path.is_file():
         raise InvalidParameter(f"{path} is no file: expected what VecNormalize's `save` wrote, or an npz of {BY_HAND}.")
+    if path.suffix == ".npz":
+        found = _arrays(path)
+        missing = {"clip", "epsilon"} - found.keys()
+        if missing:
+            raise InvalidParameter(f"{path} has no {sorted(missing)[0]!r}: expected numbers written with {BY_HAND}.")
+        return Normaliser.of_arrays(found)
     try:
-        return _of_npz(path) if path.suffix == ".npz" else _of_pickle(read_pickle(path.read_bytes()))
+        return _of_pickle(read_pickle(path.read_bytes()))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, InvalidParameter):
             raise
@@ -187,14 +193,6 @@ def read_statistics(path: str | os.PathLike) -> Normaliser:
             f"{path} holds no statistics of observations ({error}): expected what VecNormalize's `save` wrote with norm_obs. "
             f"Nothing in it was run. Write them as numbers: {BY_HAND}."
         ) from error
-
-
-def _of_npz(path: Path) -> Normaliser:
-    found = _arrays(path)
-    missing = {"clip", "epsilon"} - found.keys()
-    if missing:
-        raise InvalidParameter(f"{path} has no {sorted(missing)[0]!r}: expected numbers written with {BY_HAND}.")
-    return Normaliser.of_arrays(found)
 
 
 def _of_pickle(root: Any) -> Normaliser:

@@ -90,21 +90,3 @@ def test_a_pickle_that_is_too_large_is_refused(monkeypatch):
     monkeypatch.setattr("irl_gym.pickled.MOST_BYTES", 10)
     with pytest.raises(ValueError, match="expected 10 at most"):
         read_pickle(pickle.dumps("x" * 20))
-
-
-@pytest.mark.parametrize("args", [(), ("f8",), ([],)])
-@pytest.mark.parametrize("state", [(3,), (3, [])])
-def test_an_array_whose_kind_is_none_is_refused(args, state):
-    kind = Call(Name("numpy", "dtype"), args, state)
-    with pytest.raises(ValueError, match="it has an array"):
-        as_numbers(Call(Name("numpy.core.multiarray", "scalar"), (kind, b"\0" * 8)))
-
-
-DOUBLED = b"\x80\x04)\x94" + b"".join(b"h%ch%c\x86\x94" % (i, i) for i in range(60))
-"""A tuple of a tuple twice, and so on: a few bytes, and 2^60 parts to whoever writes it out or hashes it."""
-
-
-@pytest.mark.parametrize(("raw", "says"), [(DOUBLED + b"h<\x93.", "a name that is no text"), (DOUBLED + b"}h<Ns.", "a key")])
-def test_what_would_take_for_ever_is_refused(raw, says):
-    with pytest.raises(ValueError, match=says):
-        read_pickle(raw)

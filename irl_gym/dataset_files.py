@@ -47,6 +47,11 @@ def check_told(folder: Path) -> None:
             raise DamagedFile(f"its metadata have the {name} {told.get(name)!r:.80}, which is no text")
     parse_dataset_id(told["dataset_id"])
     for name in ("observation_space", "action_space"):
+        if name not in told:
+            raise DamagedFile(
+                f"there is no {name} in its metadata.json, and no environment that a file names is made to see it: add it, as "
+                "minari.serialization.serialize_space writes it"
+            )
         told_space(name, told.get(name))
     for name in ("env_spec", "eval_env_spec"):
         _check_spec(name, told.get(name))
@@ -161,5 +166,10 @@ def _check_spec(name: str, told: Any) -> None:
         spec = json.loads(told) if isinstance(told, str) else None
     except (ValueError, RecursionError) as error:
         raise DamagedFile(f"its {name} is no json: {str(error)[:200]}") from error
-    if not isinstance(spec, dict) or not isinstance(spec.get("id"), str) or not isinstance(spec.get("kwargs", {}), dict):
+    if not isinstance(spec, dict) or not isinstance(spec.get("id"), str):
         raise DamagedFile(f"its {name} is {told!r:.80}, and no spec of an environment")
+    if not isinstance(spec.get("kwargs", {}), dict):
+        raise DamagedFile(
+            f"its {name} has the arguments {spec['kwargs']!a:.80}: expected names and values; or take {name} out of its "
+            "metadata.json"
+        )

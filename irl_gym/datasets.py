@@ -5,7 +5,6 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 """
 
 import contextlib
-import json
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 import gymnasium as gym
 import minari
 from gymnasium import spaces
-from minari.dataset.minari_storage import MinariStorage
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.dataset_files import check_episode, check_episodes, check_told
@@ -168,30 +166,9 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
             )
         try:
             check_told(base / dataset_id / "data")
-            _check_told(dataset_id, MinariStorage.read_raw_metadata(base / dataset_id / "data"))
             return minari.load_dataset(dataset_id)
         except BROKEN as error:
             raise _broken(dataset_id, error) from error
-
-
-def _check_told(dataset_id: str, metadata: Any) -> None:
-    """Check that a dataset tells its spaces: where it does not, Minari would make whatever environment it names to see them.
-
-    Raises:
-        InvalidDemonstrations: it does not, or its environment's arguments are no arguments.
-    """
-    for name in ("observation_space", "action_space"):
-        if name not in metadata:
-            raise InvalidDemonstrations(
-                f"dataset {dataset_id!r} has no {name} in its metadata.json: expected both spaces, since an environment that a "
-                "file names is not made to see them. Add it, as minari.serialization.serialize_space writes it."
-            )
-    told = json.loads(metadata.get("env_spec") or "{}")
-    if not isinstance(told.get("kwargs", {}), dict):
-        raise InvalidDemonstrations(
-            f"dataset {dataset_id!r} was recorded with the arguments {told['kwargs']!a:.90}: expected names and values. "
-            "Record it anew, or take env_spec out of its metadata.json."
-        )
 
 
 def read_minari(

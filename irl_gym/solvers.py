@@ -164,7 +164,7 @@ def solve(problem: cp.Problem, *, rows: int, solving: Solving = AUTO) -> Answer:
             stats = problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats is not None else 0
             return Answer(status, name, seconds, float(np.asarray(problem.value)), iterations, attempt)
-        if problem.status == cp.INFEASIBLE:
+        if failure == cp.INFEASIBLE:  # now: the problem keeps the status of an earlier answer
             raise SolverInfeasible(f"{name} finds that the constraints contradict each other: no reward satisfies them.")
         failures.append(f"{name}: {failure}")
         if not deadline.left:

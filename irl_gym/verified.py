@@ -21,6 +21,7 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.optimality import Loss, loss_on
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
+from irl_gym.run_folder import SURPRISES
 from irl_gym.tabulation import Tabulation
 
 JUDGED_BY_LOSS = ("FiniteLP", "FeatureLP")
@@ -75,7 +76,7 @@ def recomputed(
         return None
     try:
         known = seen_with_noise(path, table) if config.get("epsilon") else expert
-    except (IrlGymError, OSError):
+    except (IrlGymError, OSError, *SURPRISES):
         return None
     now, low, high = loss_under(table.mdp, known, reward), record.get("loss_low"), record.get("loss_bound")
     rounding = ROUNDING * now.scale_high

@@ -165,3 +165,11 @@ def test_solve_refuses_an_unknown_solver(unchecked):
 @pytest.mark.parametrize("status", Status)
 def test_status_is_a_sentence(status):
     assert status.value[0].isupper() and " " in status.value
+
+
+def test_a_program_without_an_answer_before_is_late_where_its_time_is_up_now():
+    problem = infeasible()
+    with pytest.raises(SolverInfeasible):
+        solve(problem, rows=2)
+    with pytest.raises(SolverTimeout):
+        solve(problem, rows=2, solving=Solving("auto", deadline.Deadline(1.0, 0.0)))

@@ -15,6 +15,7 @@ from irl_gym.planners import ValueIteration
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import FOR_PEOPLE, LOGS, read_json, write_json
 from irl_gym.runs import read_run
+from irl_gym.verified import recomputed
 from irl_gym.worlds import load_actions
 
 DATASET = "dataset/irl_gym/frozenlake-v1-expert-v0/data"
@@ -162,3 +163,10 @@ def test_digests_that_are_none_are_not_believed(copied, told):
     write_json(copied / ".stages" / "reward.json", {**record, "sha256": told})
     with pytest.raises(RunIncomplete, match=r"'reward' was not finished|reward\.npz is not the file"):
         read_run(copied)
+
+
+def test_a_record_that_does_not_tell_its_demonstrations_leaves_the_loss_to_the_record(finished, copied):
+    run = read_run(finished)
+    write_json(copied / ".stages" / "demonstrations.json", {"files": []})
+    asked = {**run.config, "epsilon": 0.1}
+    assert recomputed(copied, asked, run.metrics["reward"], run.table, run.expert, run.tabular) is None

@@ -49,6 +49,8 @@ class Constant:
     value: Any
     digest: str | None
     """Of its contents; None where it has no pickle, and is guarded by being the same object alone."""
+    size: int = 0
+    """Bytes of its pickle."""
 
     def now(self) -> Any:
         """What stands in its place."""
@@ -101,15 +103,21 @@ def found_in(states: list[LayerState], homes: list[Home], references: References
         value = one.now()
         if value is not ABSENT and id(value) not in met:
             met.add(id(value))
-            yield Constant(home, states[home.layer], value, digest_of(value, references))
+            yield Constant(home, states[home.layer], value, *_known(value, references))
 
 
 def digest_of(value: Any, references: References) -> str | None:
     """What the contents of a value are known by; None where it has no pickle."""
+    return _known(value, references)[0]
+
+
+def _known(value: Any, references: References) -> tuple[str | None, int]:
+    """The digest of a value's contents and the bytes of its pickle; None and 0 where it has none."""
     try:
-        return hashlib.sha256(references.dumps(value)).hexdigest()
+        data = references.dumps(value)
     except (*REFUSALS, NotTabular, NotEnumerable):
-        return None
+        return None, 0
+    return hashlib.sha256(data).hexdigest(), len(data)
 
 
 def _large(layer: int, state: LayerState, references: References) -> Iterator[tuple[Home, str]]:

@@ -4,7 +4,8 @@ What an environment is between two steps is what its layers hold: the attributes
 wrapper. A snapshot is one pickle of them all, so that what two attributes share stays shared. Not in it, but referred to:
 layers, spaces, code (functions, classes), random generators (their stand-ins, once `Snapshots` is made), and `constants`:
 large parts (a published table, a map) that a walk of random steps left alone. They are guarded: `take` notices one with
-something else in its place, `changed_constants` one that was changed inside too. The bytes never leave the process.
+something else in its place, and `changed_constants` one that was changed inside too; `take` asks it as well, the first times
+always, as what one step changes another may change back. The bytes never leave the process.
 
 Not seen: state in class attributes, modules and closures; that two arrays are views of one memory. An object that says
 itself how it is pickled (`__getstate__`, `__reduce__`) is restored as it says.
@@ -35,6 +36,10 @@ from irl_gym.copies.object_graphs import (
 )
 from irl_gym.copies.stripped import awaken_generators, duplicate, layers, replace_generators
 from irl_gym.errors import InvalidParameter, NotEnumerable, NotTabular
+
+ALWAYS, BYTES, SELDOM = 1_000, 64 << 20, 100
+"""At so many states that are taken, or until so many bytes were looked at, the insides of constants are compared with what they
+were; then at one in so many."""
 
 
 class ConstantChanged(Exception):
@@ -74,15 +79,21 @@ class Snapshots:
         self._refer_to_parts(self._references)
         self._constants = [*found_in(self._places, homes, self._guard)]
         self._constants += self._uncopied()
+        self._taken_so_far, sizes = 0, [one.size for one in self._constants]
+        self._always = min(ALWAYS, BYTES // max(sum(sizes), 1))
         self._begin()
 
     def take(self) -> Any:
         """The state now.
 
         Raises:
-            ConstantChanged: something else is in the place of a constant: `include` it, and start again.
+            ConstantChanged: something else is in the place of a constant, or inside it: `include` it, and start again.
             NotTabular: the environment made a new generator, or holds what cannot be copied.
         """
+        self._taken_so_far += 1
+        often = self._taken_so_far <= self._always or self._taken_so_far % SELDOM == 0
+        if often and (changed := self.changed_constants()):
+            raise ConstantChanged(changed[0])
         again: dict[int, Any] = {}
         for one in self._constants:
             now = one.now()

@@ -59,7 +59,10 @@ def read_curve(path: Path) -> Curve:
         OSError, ValueError: no such file, or another one.
     """
     with path.open(newline="") as file:
-        heading, *lines = csv.reader(file)
+        try:
+            heading, *lines = csv.reader(file)
+        except csv.Error as error:  # none of Python's own kinds
+            raise ValueError(str(error)) from error
     if tuple(heading) not in (COLUMNS, COLUMNS[:2]):
         raise ValueError(f"its columns are {heading}: expected {list(COLUMNS)}")
     numbers = np.array([[one or "nan" for one in line] for line in lines], dtype=np.float64).reshape(-1, len(heading))

@@ -89,7 +89,7 @@ def episode_of(here: str, raw: Any, metadata: Mapping[str, Any], first_action: i
 
 def _ending(here: str, metadata: Mapping[str, Any]) -> Any:
     told = metadata.get(ENDING, "seen")
-    if told not in get_args(Ending):
+    if not isinstance(told, str) or told not in get_args(Ending):
         raise InvalidDemonstrations(
             f"{here} has {ENDING} {told!r}: expected one of {', '.join(get_args(Ending))}. Did a newer irl_gym write it?"
         )

@@ -52,6 +52,8 @@ _VALUES = {
 _MULTIARRAY = ("numpy.core.multiarray", "numpy._core.multiarray")
 _NUMERIC = ("numpy.core.numeric", "numpy._core.numeric")
 _KINDS = "biuf"
+_KEYS = (str, bytes, int, float, Name, type(None))
+"""Of dictionaries; a tuple of these, too."""
 
 
 def read_pickle(raw: bytes) -> Any:
@@ -97,7 +99,7 @@ class _Machine:
         elif name in ("TUPLE", "LIST", "DICT", "FROZENSET"):
             found = self._marked()
             made = {"TUPLE": tuple, "LIST": list, "FROZENSET": list}.get(name)
-            stack.append(dict(_pairs(found)) if made is None else made(found))
+            stack.append(_dictionary(found) if made is None else made(found))
         elif name in ("TUPLE1", "TUPLE2", "TUPLE3"):
             count = int(name[-1])
             stack[-count:] = [tuple(stack[-count:])]
@@ -126,7 +128,7 @@ class _Machine:
             del self.stack[-len(found) :]
         target = self.stack[-1]
         if pairs and isinstance(target, dict):
-            target.update(_pairs(found))
+            target.update(_dictionary(found))
         else:
             (target.items if isinstance(target, Call) else target).extend(found)
 
@@ -137,7 +139,9 @@ class _Machine:
             stack.append(Name(module, what))
         elif name == "STACK_GLOBAL":
             module, what = stack.pop(-2), stack.pop()
-            stack.append(Name(str(module), str(what)))
+            if not isinstance(module, str) or not isinstance(what, str):
+                raise ValueError("it has a name that is no text")
+            stack.append(Name(module, what))
         elif name in ("REDUCE", "NEWOBJ"):
             args, maker = stack.pop(), stack.pop()
             stack.append(Call(maker, args))
@@ -150,8 +154,12 @@ class _Machine:
             raise ValueError(f"it has the opcode {name}: expected plain data")
 
 
-def _pairs(flat: list[Any]) -> list[tuple[Any, Any]]:
-    return list(zip(flat[::2], flat[1::2], strict=True))
+def _dictionary(flat: list[Any]) -> dict[Any, Any]:
+    """Keys and values in turn. Python hashes a tuple by hashing what it holds, however deep: so keys are plain."""
+    for key in flat[::2]:
+        if not all(isinstance(one, _KEYS) for one in (key if isinstance(key, tuple) else (key,))):
+            raise ValueError(f"it has a dictionary with a {type(key).__name__} as a key")
+    return dict(zip(flat[::2], flat[1::2], strict=True))
 
 
 def as_numbers(found: Any) -> np.ndarray:
@@ -160,9 +168,9 @@ def as_numbers(found: Any) -> np.ndarray:
     Raises:
         ValueError: anything else.
     """
-    if isinstance(found, bool | int | float):
-        return np.asarray(found, dtype=np.float64)
     try:
+        if isinstance(found, bool | int | float):
+            return np.asarray(found, dtype=np.float64)
         if isinstance(found, Call) and found.is_of("_reconstruct", *_MULTIARRAY):
             _, shape, dtype, fortran, raw = found.state
             return _array(raw, dtype, shape, "F" if fortran else "C")
@@ -172,7 +180,7 @@ def as_numbers(found: Any) -> np.ndarray:
         if isinstance(found, Call) and found.is_of("scalar", *_MULTIARRAY):
             dtype, raw = found.args
             return _array(raw, dtype, (), "C")
-    except (TypeError, OverflowError) as error:
+    except (TypeError, OverflowError, LookupError) as error:
         raise ValueError(f"it has an array that is none ({error})") from error
     raise ValueError(f"it has {type(found).__name__} where a number or an array is expected")
 
@@ -181,7 +189,9 @@ def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
     """An array of its bytes."""
     if not isinstance(dtype, Call) or not dtype.is_of("dtype", "numpy") or not isinstance(raw, bytes | bytearray):
         raise ValueError("it has an array without numbers")
-    kind, byteorder = str(dtype.args[0]), str((dtype.state or (3, "="))[1])
+    kind, byteorder = dtype.args[0], (dtype.state or (3, "="))[1]
+    if not isinstance(kind, str) or not isinstance(byteorder, str):
+        raise ValueError("it has an array of numbers without a name")
     if kind[:1] not in _KINDS or kind[1:] not in ("1", "2", "4", "8") or byteorder not in ("<", ">", "=", "|"):
         raise ValueError(f"it has an array of {kind}: expected numbers")
     return np.frombuffer(bytes(raw), dtype=byteorder + kind).reshape(tuple(map(int, shape)), order="F" if order == "F" else "C")

@@ -24,7 +24,7 @@ from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import START, read_json, read_record
-from irl_gym.run_reader import RunReader
+from irl_gym.run_reader import RunReader, understood
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
@@ -119,7 +119,12 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         RunConflict: no run of this library, or one with a link that leads out of its folder.
         RunNewer: a newer version wrote it.
     """
-    path = Path(path)
+    with understood(path):
+        return _read(Path(path), table)
+
+
+def _read(path: Path, table: Tabulation | None) -> Run:
+    """The run; json that says what no run says raises whatever it raises."""
     if not (path / "config.json").is_file():
         raise RunIncomplete(f"{path} holds no run: expected a folder with a config.json. Name the --out of a run.")
     check_links(path)

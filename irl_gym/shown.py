@@ -183,7 +183,12 @@ def read_statistics(path: str | os.PathLike) -> Normaliser:
         missing = {"clip", "epsilon"} - found.keys()
         if missing:
             raise InvalidParameter(f"{path} has no {sorted(missing)[0]!r}: expected numbers written with {BY_HAND}.")
-        return Normaliser.of_arrays(found)
+        try:
+            return Normaliser.of_arrays(found)
+        except (ValueError, TypeError) as error:
+            if isinstance(error, InvalidParameter):
+                raise
+            raise InvalidParameter(f"{path} holds no such numbers ({error}): expected those of {BY_HAND}.") from error
     try:
         return _of_pickle(read_pickle(path.read_bytes()))
     except (ValueError, KeyError, TypeError, AttributeError) as error:

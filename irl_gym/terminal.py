@@ -57,7 +57,12 @@ def print_table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]
     Console(width=width, markup=False, emoji=False).print(table)
 
 
+def harmless(text: str) -> str:
+    """A text that may be out of a file, without what a terminal obeys: controls, and marks that turn its direction."""
+    return "".join(one if one.isprintable() or one == "\n" else ascii(one)[1:-1] for one in text)
+
+
 def print_error(error: Exception) -> None:
     """A mistake of the user's, or what the system refused, in one line on standard error: the error's name, and its words."""
-    text = Text.assemble((type(error).__name__, "bold red"), f": {error}")
+    text = Text.assemble((type(error).__name__, "bold red"), f": {harmless(str(error))}")
     Console(stderr=True, soft_wrap=True).print(text)

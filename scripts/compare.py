@@ -19,7 +19,7 @@ from irl_gym.page.pooled import told
 from irl_gym.pooling import pools
 from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
-from irl_gym.terminal import check_writable, print_error
+from irl_gym.terminal import check_writable, harmless, print_error
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def main(arguments: Arguments) -> int:
         return 2
     console = Console(soft_wrap=True)
     for line in together:
-        console.print(Text(line))
+        console.print(Text(harmless(line)))
     console.print(Text(f"Wrote {arguments.out}: {len(runs)} runs side by side."))
     return 0
 

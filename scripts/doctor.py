@@ -22,7 +22,7 @@ from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
 from irl_gym.errors import RunIncomplete
 from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
-from irl_gym.terminal import print_error
+from irl_gym.terminal import harmless, print_error
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,18 @@ class Arguments:
 def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
     """Print a diagnosis: with the names of states where the run is at hand, and mends as Python and as flags."""
     if diagnosis.healthy:
-        console.print(Text.assemble(("Healthy. ", "bold green"), diagnosis.examined))
+        console.print(Text.assemble(("Healthy. ", "bold green"), harmless(diagnosis.examined)))
         return
     count = len(diagnosis.findings)
-    console.print(Text.assemble((f"{count} finding{'s' if count > 1 else ''}. ", "bold yellow"), diagnosis.examined))
+    console.print(Text.assemble((f"{count} finding{'s' if count > 1 else ''}. ", "bold yellow"), harmless(diagnosis.examined)))
     for number, one in enumerate(diagnosis.findings, start=1):
         known = run is not None and run.table is not None
         sentence = with_names(one.sentence, run.state_name, run.actions) if run is not None and known else one.sentence
-        console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {sentence}"))
-        console.print(Text.assemble(("   Mend: ", "bold"), one.mend))
+        console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {harmless(sentence)}"))
+        console.print(Text.assemble(("   Mend: ", "bold"), harmless(one.mend)))
         flags = usable_flags(one.flags, given=run is not None and run.config.get("dataset") is not None)
         if flags:
-            console.print(Text.assemble(("   Flags: ", "bold"), ", ".join(flags)))
+            console.print(Text.assemble(("   Flags: ", "bold"), harmless(", ".join(flags))))
 
 
 def left(path: Path) -> Diagnosis | None:

@@ -57,6 +57,13 @@ def test_an_episode_that_goes_on_after_an_end_is_refused_by_name(data, tmp_path,
         read(tmp_path)
 
 
+def test_an_ending_that_is_no_text_is_refused(data, tmp_path):
+    with h5py.File(tmp_path / ID / "data" / "main_data.hdf5", "r+") as file:
+        file["episode_1"].attrs["irl_gym_ending"] = np.array([1, 2])
+    with pytest.raises(InvalidDemonstrations, match="episode 1 has irl_gym_ending"):
+        read(tmp_path)
+
+
 def test_an_episode_that_goes_on_after_an_end_is_cut_there_when_told(data, tmp_path):
     data(terminations=[False, True, False, False, True])
     cut = read(tmp_path, "cut")

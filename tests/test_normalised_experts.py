@@ -220,3 +220,11 @@ def test_an_export_shows_its_expert_what_its_training_showed(cart, tmp_path):
     episode = next(recording.demonstrator(gym.make("CartPole-v1"), tmp_path).episodes(0))
     wanted = model.predict(venv.normalize_obs(episode.observations[:-1]), deterministic=True)[0]
     np.testing.assert_array_equal(episode.actions, wanted)
+
+
+@pytest.mark.parametrize("change", [{"clip": np.zeros(3)}, {"mean": np.array("x")}])
+def test_statistics_that_are_no_numbers_are_refused(tmp_path, change):
+    arrays = {"mean": np.zeros(1), "var": np.ones(1), "clip": np.array(10.0), "epsilon": np.array(1e-8)}
+    np.savez(tmp_path / "statistics.npz", **arrays | change)
+    with pytest.raises(InvalidParameter, match="holds no such numbers"):
+        read_statistics(tmp_path / "statistics.npz")

@@ -90,3 +90,30 @@ def test_a_pickle_that_is_too_large_is_refused(monkeypatch):
     monkeypatch.setattr("irl_gym.pickled.MOST_BYTES", 10)
     with pytest.raises(ValueError, match="expected 10 at most"):
         read_pickle(pickle.dumps("x" * 20))
+
+
+SHARED = b")" + b"".join(b"q" + bytes([i]) + b"h" + bytes([i]) + b"\x86" for i in range(60))
+"""A tuple of one tuple twice, of one tuple twice, ..., of which Python would hash or write out 2 ** 60."""
+
+
+@pytest.mark.parametrize(
+    "raw", [b"}" + b")" + b"\x85" * 100_000 + b"Ns.", b"}" + SHARED + b"Ns.", b"(" + SHARED + b"Nd.", SHARED * 2 + b"\x93."]
+)
+def test_tuples_within_tuples_are_neither_hashed_nor_written_out(raw):
+    with pytest.raises(ValueError, match="it is no pickle of plain data"):
+        read_pickle(raw)
+
+
+@pytest.mark.parametrize(
+    ("kind", "state", "match"),
+    [((), (3, "<"), "none"), (("f8",), (3,), "none"), (("f8",), {"a": 1}, "none"), ((1,), (3, "<"), "without a name")],
+)
+def test_an_array_of_an_odd_dtype_is_refused(kind, state, match):
+    dtype = Call(Name("numpy", "dtype"), kind, state)
+    with pytest.raises(ValueError, match=match):
+        as_numbers(Call(Name("numpy._core.numeric", "_frombuffer"), (bytes(8), dtype, (1,), "C")))
+
+
+def test_a_number_that_is_no_float_is_refused():
+    with pytest.raises(ValueError, match="none"):
+        as_numbers(10**400)

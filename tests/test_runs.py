@@ -155,6 +155,19 @@ def test_a_run_with_a_damaged_file_is_incomplete_by_name(unvouched, name):
         read_run(unvouched)
 
 
+def test_a_curve_with_a_field_that_has_no_end_is_damage(unvouched):
+    (unvouched / "learning_curve.csv").write_text("a" * 300_000)
+    with pytest.raises(RunIncomplete, match=r"learning_curve\.csv cannot be read"):
+        read_run(unvouched)
+
+
+@pytest.mark.parametrize("change", [{"reward": {"learner": "FiniteLP", "loss_low": "x"}}, {"reward": None}])
+def test_metrics_that_say_what_no_run_says_are_not_understood(unvouched, change):
+    write_json(unvouched / "metrics.json", read_json(unvouched / "metrics.json") | change)
+    with pytest.raises(RunIncomplete, match="cannot be understood"):
+        read_run(unvouched)
+
+
 def test_a_copied_run_is_continued_where_it_is_and_not_where_it_came_from(finished, copied):
     (copied / "reward.npz").unlink()
     with pytest.raises(RunIncomplete) as told:

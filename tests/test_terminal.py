@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from irl_gym.errors import RunIncomplete
-from irl_gym.terminal import print_error, stage_bars
+from irl_gym.terminal import harmless, print_error, stage_bars
 
 
 def shown(*, terminal):
@@ -42,3 +42,13 @@ def test_an_error_is_one_line_on_standard_error(capsys, error):
     print_error(error)
     said = capsys.readouterr()
     assert said.out == "" and said.err == f"{type(error).__name__}: {error}\n"
+
+
+def test_an_error_shows_what_a_terminal_would_obey_and_does_not_send_it(capsys):
+    print_error(RunIncomplete("gamma \x1b]0;title\x07\x1b[31m \x9b31m \u202e \ud800\nexpected é"))
+    said = capsys.readouterr().err
+    assert not set("\x1b\x07\x9b\u202e\ud800") & set(said) and "\\x1b]0;title\\x07" in said and "\nexpected é" in said
+
+
+def test_a_plain_text_is_shown_as_it_is():
+    assert harmless("a b\nc é 状態 [bold]") == "a b\nc é 状態 [bold]"

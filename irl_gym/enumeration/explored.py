@@ -206,7 +206,7 @@ def _check(found: dict[str, np.ndarray], told: dict[str, Any], space: spaces.Spa
     missing = [name for name in PARTS if name not in found]
     if missing:
         raise DamagedFile(f"it has no {missing[0]}: expected one beside {sorted(found)[:9]}.")
-    sizes = {name: found[name].shape[:1] for name in PARTS}
+    sizes = {name: found[name].shape[:1] or (0,) for name in PARTS}
     n, e, k = sizes["states"], sizes["ends"], (len(ranges(space)),)
     shapes = {**sizes, "states": n + k, "ends": e + k, "parents": n, "actions": n, "script_lengths": n}
     shapes |= dict.fromkeys(("successors", "probabilities", "rewards"), sizes["rows"])

@@ -11,9 +11,9 @@ import pytest
 from enumeration_envs import Board, Corridor, Slippery, same_table
 from stopped import run_until
 
-from irl_gym.enumeration.explored import Explored
+from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.table import Enumeration
-from irl_gym.errors import EnumerationLimit, RunConflict
+from irl_gym.errors import EnumerationLimit, IrlGymError, RunConflict
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 
@@ -272,3 +272,14 @@ def test_a_half_of_a_state_is_never_kept(tmp_path):
     explored.save(tmp_path / "search.npz", space, {})
     with np.load(tmp_path / "search.npz", allow_pickle=False) as kept:
         assert (kept["states"].tolist(), kept["ends"].size, kept["rows"].size, kept["scripts"].size) == ([[0]], 0, 0, 0)
+
+
+@pytest.mark.parametrize("name", ["scripts", "rows", "states", "sampled"])
+def test_a_search_with_a_number_in_place_of_a_column_is_refused(tmp_path, name):
+    found, space = Explored(2), gym.spaces.Discrete(3)
+    found.starts[found.add(0, -1, -1, ())] = 1.0
+    found.expand(0, [(0, 0, 1.0, 0.0), (1, 0, 1.0, 0.0)])
+    found.save(tmp_path / "search.npz", space, {})
+    np.savez(tmp_path / "search.npz", **{**np.load(tmp_path / "search.npz"), name: np.array(5)})
+    with pytest.raises(IrlGymError, match=f"its {name} have shape"):
+        load_explored(tmp_path / "search.npz", space, 2, {})

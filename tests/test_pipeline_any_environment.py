@@ -156,8 +156,8 @@ def test_an_expert_may_be_what_another_run_left(runs, tmp_path, file):
     again = recover_and_retrain(asked, tmp_path / "run")
     of = "expert" if file.startswith("expert") else "retrained"
     assert again.metrics["policies"]["expert"]["value"] == pytest.approx(first.metrics["policies"][of]["value"])
-    assert again.stages["expert"] | {"seconds": 0, "files": []} == {
-        "planner": "FromFile", "environment_steps": 0, "seconds": 0, "files": []
+    assert again.stages["expert"] | {"seconds": 0, "files": [], "sha256": {}} == {
+        "planner": "FromFile", "environment_steps": 0, "seconds": 0, "files": [], "sha256": {}
     }  # fmt: skip
 
 

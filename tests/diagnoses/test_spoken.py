@@ -13,7 +13,7 @@ from irl_gym.terminal import OPTIONS
 
 CHOSEN = {
     "--episodes": "50", "--epsilon": "0.1", "--features": "radial", "--gamma": "0.9", "--l1": "0.5", "--rounds": "9",
-    "--total-timesteps": "1000", "--shaping": "", "--steps": "400000",
+    "--total-timesteps": "1000", "--shaping": "", "--steps": "400000", "--expert-normalize": "vecnormalize.pkl",
 }  # fmt: skip
 """What a reader may choose for flags that are said without a value."""
 SAID = sorted(

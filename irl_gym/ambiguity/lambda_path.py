@@ -195,7 +195,7 @@ def _check(path: str | os.PathLike, arrays: dict[str, np.ndarray], numbers: dict
         if name == "whole":
             if not isinstance(value, bool):
                 raise InvalidReward(f"{path} has {name} {value!r:.80}: expected true or false.")
-        elif not (name == "margin_cap" and value is None) and not (name == "violation" and value != value):
+        elif not (name == "margin_cap" and value is None) and not (name in ("gap", "violation") and value != value):
             least = None if name == "gap" else 0
             checked_number(f"{name} of {path}", value, "a finite number", least=least, error=InvalidReward)
 

@@ -66,7 +66,8 @@ def content(folder):
 
 
 @pytest.mark.parametrize("what", [RUN, EXPORT], ids=["run", "export"])
-@pytest.mark.parametrize("kills", [1, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [1, 50])
 def test_what_is_killed_at_random_ends_in_the_same_bytes(tmp_path, what, kills):
     rng, done, round_ = np.random.default_rng(kills), 0, 0
     (tmp_path / "00").mkdir()

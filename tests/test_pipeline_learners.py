@@ -230,10 +230,11 @@ def test_the_report_says(runs, name):
     [
         (Experiment("CartPole-v1", 0.99, learner=cap_lp()), NotDiscrete, "give bins, .*Or learn .*TrajectoryLP"),
         (Experiment("Blackjack-v1", 0.99, reveal={}, learner=cap_lp()), NotTabular, r"`Reveal\(env\)`.*--table sample"),
-        (
+        pytest.param(  # a minute and a half, until what is hidden in Blackjack's deck of hands shows
             Experiment("Blackjack-v1", 0.99, reveal={}, table=Enumeration(), learner=cap_lp()),
             HiddenState,
             "--reveal .*--table sample",
+            marks=pytest.mark.slow,
         ),
     ],
 )

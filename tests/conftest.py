@@ -7,6 +7,7 @@ jaxtyping.install_import_hook("irl_gym", "typechecker.check")
 import gymnasium as gym  # noqa: E402  (nothing of irl_gym may be imported before the hook)
 import hypothesis  # noqa: E402
 import pytest  # noqa: E402
+import typechecker  # noqa: E402
 
 for profile, examples in (("irl_gym", 15), ("thorough", 100)):  # the second by `make bars`
     hypothesis.settings.register_profile(profile, deadline=None, derandomize=True, max_examples=examples, database=None)
@@ -16,6 +17,10 @@ hypothesis.settings.load_profile("irl_gym")
 def pytest_configure(config):
     # Gymnasium's Tuple and Dict spaces derive from typing.Sequence and typing.Mapping, which beartype frowns at.
     config.addinivalue_line("filterwarnings", "ignore::beartype.roar.BeartypeDecorHintPep585DeprecationWarning")
+
+
+def pytest_runtest_setup():
+    typechecker.begin()
 
 
 KWARGS = {

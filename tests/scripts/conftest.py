@@ -14,7 +14,9 @@ PLAN = ("--episodes", "5", "--retrain", "value-iteration")
 
 
 @pytest.fixture(scope="session")
-def script():
+def process():
+    """A script by its name, in a process of its own."""
+
     def run(name, *arguments, cwd):
         command = [sys.executable, str(ROOT / "scripts" / f"{name}.py"), *map(str, arguments)]
         return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=HANG)
@@ -32,15 +34,21 @@ def called(capsys, monkeypatch, unchecked):
         with pytest.raises(SystemExit) as ended:
             runpy.run_path(str(path), run_name="__main__")
         said = capsys.readouterr()
-        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
+        return SimpleNamespace(returncode=ended.value.code or 0, stdout=said.out, stderr=said.err)
 
     return call
 
 
+@pytest.fixture
+def script(called):
+    """A script by its name, called in this process."""
+    return lambda name, *arguments, cwd: called(ROOT / "scripts" / f"{name}.py", *arguments, cwd=cwd)
+
+
 @pytest.fixture(scope="session")
-def planned(script, tmp_path_factory):
+def planned(process, tmp_path_factory):
     """A folder with a finished run, `plain`, whose agent was planned; to be copied by who changes it."""
     cwd = tmp_path_factory.mktemp("planned")
-    made = script("recover_and_retrain", *PLAN, "--out", "plain", cwd=cwd)
+    made = process("recover_and_retrain", *PLAN, "--out", "plain", cwd=cwd)
     assert made.returncode == 0, made.stderr
     return cwd

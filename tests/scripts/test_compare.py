@@ -8,10 +8,10 @@ from forgetting import without_digests
 
 
 @pytest.fixture(scope="module")
-def finished(script, planned, tmp_path_factory):
+def finished(process, planned, tmp_path_factory):
     cwd = tmp_path_factory.mktemp("script")
     shutil.copytree(planned / "plain", cwd / "plain")
-    made = script(
+    made = process(
         "recover_and_retrain", "--episodes", "5", "--retrain", "value-iteration", "--l1", "0.5", "--out", "priced", cwd=cwd
     )
     assert made.returncode == 0, made.stderr

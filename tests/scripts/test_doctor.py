@@ -3,14 +3,11 @@
 import re
 import runpy
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from forgetting import without_digests
-from stopped import HANG
 
 from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
 from irl_gym.experiment import Experiment
@@ -38,35 +35,36 @@ def runs(tmp_path_factory):
     return folder
 
 
-def doctor(folder):
-    return subprocess.run([sys.executable, str(SCRIPT), "--run", str(folder)], capture_output=True, text=True, timeout=HANG)
+@pytest.fixture
+def doctor(script, tmp_path):
+    return lambda folder: script("doctor", "--run", folder, cwd=tmp_path)
 
 
-def test_a_healthy_run_exits_with_0(runs):
+def test_a_healthy_run_exits_with_0(doctor, runs):
     done = doctor(runs / "healthy")
     assert done.returncode == 0 and done.stdout.startswith("Healthy. Examined: 11 states") and done.stderr == ""
 
 
-def test_findings_exit_with_1_and_are_printed_with_their_mends(runs):
+def test_findings_exit_with_1_and_are_printed_with_their_mends(doctor, runs):
     done = doctor(runs / "paper")
     assert done.returncode == 1 and "avoidable-ties" in done.stdout and 'Mend: margin_cap="auto"' in done.stdout
 
 
-def test_mends_are_flags_too_and_states_have_their_names(runs):
+def test_mends_are_flags_too_and_states_have_their_names(doctor, runs):
     said = doctor(runs / "paper").stdout
     assert "Flags: --margin-cap auto, --l1 0" in said and re.search(
         r"s=(\d+) a=\d \(row \d, column \d; (left|down|right|up)\)", said
     )
 
 
-def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(runs, tmp_path):
+def test_a_run_that_did_not_finish_says_why_and_what_can_be_said(doctor, runs, tmp_path):
     shutil.copytree(runs / "healthy", tmp_path / "killed")
     (tmp_path / "killed" / ".stages" / "reward.json").unlink()
     done = doctor(tmp_path / "killed")
     assert done.returncode == 1 and "'reward' was not finished" in done.stderr and "no-reward" in done.stdout
 
 
-def test_a_run_without_its_page_is_told_apart_and_how_to_write_it(runs, tmp_path):
+def test_a_run_without_its_page_is_told_apart_and_how_to_write_it(doctor, runs, tmp_path):
     out = shutil.copytree(runs / "healthy", tmp_path / "no page")
     for name in ("report.html", ".stages/report.json"):
         (out / name).unlink()
@@ -76,20 +74,20 @@ def test_a_run_without_its_page_is_told_apart_and_how_to_write_it(runs, tmp_path
     assert f"{told}python scripts/report.py --run '{out}'" in done.stdout
 
 
-def test_a_run_of_an_earlier_version_without_a_page_did_finish(runs, tmp_path):
+def test_a_run_of_an_earlier_version_without_a_page_did_finish(doctor, runs, tmp_path):
     out = shutil.copytree(runs / "healthy", tmp_path / "older")
     for name in ("run.json", "report.html", ".stages/report.json"):
         (out / name).unlink()
     assert doctor(out).returncode == 0
 
 
-def test_a_reward_of_another_table_is_named_with_its_run(runs, tmp_path):
+def test_a_reward_of_another_table_is_named_with_its_run(doctor, runs, tmp_path):
     out = without_digests(shutil.copytree(runs / "healthy", tmp_path / "mixed"))
     TabularReward(np.zeros(36)).save(out / "reward.npz")
     assert f"{out} is incomplete: reward.npz has shape (36,)" in doctor(out).stderr
 
 
-def test_a_folder_without_a_run_exits_with_2(tmp_path):
+def test_a_folder_without_a_run_exits_with_2(doctor, tmp_path):
     done = doctor(tmp_path)
     assert done.returncode == 2 and "holds no run" in done.stderr and "Traceback" not in done.stderr
 
@@ -104,7 +102,7 @@ def test_a_folder_that_may_not_be_read_gets_one_clear_line(monkeypatch, tmp_path
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path}'\n"
 
 
-def test_one_episode_is_judged_and_told_to_tell_no_noise(tmp_path):
+def test_one_episode_is_judged_and_told_to_tell_no_noise(doctor, tmp_path):
     learner = TrajectoryLP(np.eye(16), trajectories=100, max_rounds=2)
     asked = Experiment("FrozenLake-v1", 0.99, learner=learner, retrain=ValueIteration(), episodes=1, eval_episodes=5)
     made = recover_and_retrain(asked, tmp_path / "one")

@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import minari
 import pytest
-from stopped import HANG, run_until
+from stopped import run_until
 from yardstick import yard
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "export_dataset.py"
@@ -22,8 +22,9 @@ def command(*arguments):
     return [sys.executable, str(SCRIPT), *arguments]
 
 
-def run(*arguments):
-    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=HANG)
+@pytest.fixture
+def run(script, tmp_path):
+    return lambda *arguments: script("export_dataset", *arguments, cwd=tmp_path)
 
 
 @pytest.fixture
@@ -36,7 +37,7 @@ def opened(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "arrow"])
-def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
+def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind, run):
     made = run(*LAKE, "--episodes", "30", "--format", kind, "--epsilon", "0.1", "--root", str(tmp_path))
     assert made.returncode == 0 and f"{ID}: 30 episodes" in made.stdout and made.stderr == ""
     dataset = opened(tmp_path)
@@ -54,29 +55,33 @@ def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind):
         (("--env-id", "CartPole-v1", "--env-kwargs", "{}"), "Or choose ppo, dqn or a2c"),
     ],
 )
-def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, called, arguments, says):
-    made = called(SCRIPT, *LAKE, "--root", str(tmp_path), *arguments, cwd=tmp_path)
+def test_a_mistake_gets_one_clear_line_and_leaves_nothing(tmp_path, run, arguments, says):
+    made = run(*LAKE, "--root", str(tmp_path), *arguments)
     assert made.returncode == 2 and says in made.stderr and "Traceback" not in made.stderr
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_known_to_be_hidden_is_revealed(tmp_path, opened):
-    taxi = ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--dataset-id", ID, "--root", str(tmp_path))
-    made = run(*taxi, "--episodes", "3")
+def test_what_is_known_to_be_hidden_is_revealed(tmp_path, opened, run):
+    made = run("--env-id", "Blackjack-v1", "--env-kwargs", "{}", "--dataset-id", ID, "--root", str(tmp_path), "--episodes", "3")
     assert made.returncode == 0, made.stderr
-    assert set(opened(tmp_path).recover_environment().observation_space.spaces) == {"observation", "fickle_step"}
-    hidden = run(*taxi, "--episodes", "3", "--dataset-id", "lake/hidden-v0", "--reveal", "none")
-    assert hidden.returncode == 2 and "HiddenState" in hidden.stderr
+    assert set(opened(tmp_path).recover_environment().observation_space.spaces) == {"observation", "natural"}
 
 
-def test_layouts_are_drawn_from_the_seeds_named(tmp_path, opened):
+@pytest.mark.slow
+def test_what_is_hidden_and_asked_not_to_be_revealed_is_refused(tmp_path, run):
+    taxi = ("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--dataset-id", ID, "--root", str(tmp_path))
+    made = run(*taxi, "--episodes", "3", "--reveal", "none")
+    assert made.returncode == 2 and "HiddenState" in made.stderr
+
+
+def test_layouts_are_drawn_from_the_seeds_named(tmp_path, opened, run):
     made = run(*LAKE, "--start-seeds", "0", "--episodes", "3", "--root", str(tmp_path))
     assert made.returncode == 0, made.stderr
     (wrapper,) = opened(tmp_path).env_spec.additional_wrappers
     assert wrapper.name == "SeededStarts" and list(wrapper.kwargs["seeds"]) == [0]
 
 
-def test_a_taken_id_is_refused(tmp_path):
+def test_a_taken_id_is_refused(tmp_path, run):
     arguments = (*LAKE, "--episodes", "5", "--root", str(tmp_path))
     assert run(*arguments).returncode == 0
     again = run(*arguments)
@@ -94,17 +99,17 @@ MOMENTS = [
 
 
 @pytest.fixture(scope="module")
-def straight(tmp_path_factory):
+def straight(process, tmp_path_factory):
     """Roots by format, each with a dataset in it that nobody interrupted."""
     roots = {kind: tmp_path_factory.mktemp(kind) for kind in ("hdf5", "arrow")}
     for kind, root in roots.items():
-        made = run(*LAKE, "--episodes", str(EPISODES), "--format", kind, "--root", str(root))
+        made = process("export_dataset", *LAKE, "--episodes", EPISODES, "--format", kind, "--root", root, cwd=root)
         assert made.returncode == 0, made.stderr
     return roots
 
 
 @pytest.mark.parametrize(("kind", "where", "nth"), MOMENTS)
-def test_a_kill_at_any_stage_leaves_the_same_dataset(tmp_path, opened, straight, kind, where, nth):
+def test_a_kill_at_any_stage_leaves_the_same_dataset(tmp_path, opened, straight, kind, where, nth, run):
     whole = straight[kind]
     arguments = (*LAKE, "--episodes", str(EPISODES), "--format", kind, "--root", str(tmp_path))
     made = run_until(SCRIPT, *arguments, where=where, nth=nth, sent=signal.SIGKILL, **OFTEN)
@@ -122,7 +127,7 @@ def test_a_kill_at_any_stage_leaves_the_same_dataset(tmp_path, opened, straight,
         assert [str(vars(one)) for one in first] == [str(vars(one)) for one in second]
 
 
-def test_another_plan_is_refused_while_one_is_under_way(tmp_path):
+def test_another_plan_is_refused_while_one_is_under_way(tmp_path, run):
     arguments = (*LAKE, "--episodes", str(EPISODES), "--root", str(tmp_path))
     run_until(SCRIPT, *arguments, where=ENTERED, nth=30, sent=signal.SIGKILL, **OFTEN)
     made = run(*arguments, "--seed", "1")

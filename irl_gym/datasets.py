@@ -158,7 +158,7 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
     with minari_root(root) as base:
         check_id(dataset_id)
         if not (base / dataset_id).exists():
-            found = sorted(minari.list_local_datasets())
+            found = _ids(base)
             there = f"There are {', '.join(found[:5])}." if found else "There is none."
             raise DatasetMissing(
                 f"dataset {dataset_id!r} is not under {base}: expected one of the datasets there. {there} Name the root "
@@ -169,6 +169,18 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
             return minari.load_dataset(dataset_id)
         except BROKEN as error:
             raise _broken(dataset_id, error) from error
+
+
+def _ids(base: Path) -> list[str]:
+    """The ids of the datasets under a root. Minari's own listing stumbles over a folder whose name is no id."""
+    found = []
+    for place, folders, _ in os.walk(base):
+        if "data" in folders and Path(place) != base:
+            folders.clear()
+            with contextlib.suppress(InvalidParameter):
+                found.append(check_id(Path(place).relative_to(base).as_posix()))
+        folders[:] = [one for one in folders if not one.startswith(".")]
+    return sorted(found)
 
 
 def read_minari(

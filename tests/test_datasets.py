@@ -153,6 +153,13 @@ def test_a_missing_dataset_names_those_that_are_there(root):
         load_minari("nothing-v0", root=root)
 
 
+def test_a_folder_whose_name_is_no_id_is_not_among_the_datasets_that_are_there(root):
+    for name in ("odd name", "me/no-version", "."):
+        (root / name / "data").mkdir(parents=True)
+    with pytest.raises(DatasetMissing, match=f"There are {ID}\\."):
+        load_minari("nothing-v0", root=root)
+
+
 def test_a_missing_dataset_says_when_there_is_none(tmp_path):
     with pytest.raises(DatasetMissing, match=r"There is none. Name the root folder, or set MINARI_DATASETS_PATH"):
         load_minari("nothing-v0", root=tmp_path)

@@ -157,6 +157,13 @@ def test_a_record_that_names_files_outside_of_the_run_is_none(copied, monkeypatc
         read_run(copied)
 
 
+@pytest.mark.parametrize("stage", ["start", "reward", "record"])
+def test_a_record_whose_digests_are_empty_vouches_for_nothing(copied, stage):
+    kept = copied / ".stages" / f"{stage}.json"
+    write_json(kept, {**read_json(kept), "sha256": {}})
+    assert not read_run(copied).vouched
+
+
 @pytest.mark.parametrize("told", [[], "all", 7, None, {"reward.npz": 7}, {"reward.npz": None}])
 def test_digests_that_are_none_are_not_believed(copied, told):
     record = json.loads((copied / ".stages" / "reward.json").read_text())

@@ -6,11 +6,11 @@ import threading
 import gymnasium
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import Corridor, Shows
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import StickyAction
-from mended import GAMMA, SHOWN, Shows, done, error_of, mends, revealed
+from mended import GAMMA, SHOWN, done, error_of, mends, revealed
 
 from irl_gym.counting import Interaction
 from irl_gym.enumeration.table import Enumeration

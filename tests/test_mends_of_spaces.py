@@ -3,9 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import Corridor, Shows
 from gymnasium import spaces
-from mended import GAMMA, SHOWN, Shows, done, error_of, mends
+from mended import GAMMA, SHOWN, done, error_of, mends
 
 from irl_gym.counting import Interaction, interact
 from irl_gym.discretize import discretize

@@ -130,7 +130,8 @@ def _check_header(where: str, separator: str, header: list[str], columns: dict[s
     other = max((one for one in NAMES if one != separator), key=text.count)
     if text.lstrip().startswith("#"):
         named = set(re.split(r"[#\s,;|]+", text)) & set(wanted)
-        mend = "Take the '#' away." if named else "Delete the comments, or pass pandas.read_csv(..., comment='#')."
+        apart = f"Take the '#' away, and pass pandas.read_csv(..., sep={other!r})."
+        mend = apart if named else "Delete the comments, or pass pandas.read_csv(..., comment='#')."
         what = f"a header, such as {wanted}, before any comment. {mend}"
     elif text.count(other) >= len(header) and (other != " " or len(header) == 1):
         suffix = next((f"Let the file end in {one}, or pass" for one, sign in SEPARATORS.items() if sign == other), "Pass")

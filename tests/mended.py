@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from irl_gym.discretize import discretize
 from irl_gym import errors
+from irl_gym.discretize import discretize
 from irl_gym.errors import HiddenState, UnknownObservation
 from irl_gym.reveal import Reveal
 from irl_gym.tabulate import tabulate

@@ -70,15 +70,19 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
 
 
 def _read_parquet(path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
+    import pyarrow as pa
     import pyarrow.parquet
 
     check_parquet(path)
     there = pyarrow.parquet.read_schema(path).names
     _check_columns(path.name, there, columns, optional)
     wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
-    table = pyarrow.parquet.read_table(path, columns=wanted)
-    table.validate(full=True)
-    return table.to_pandas(ignore_metadata=True), lambda row: f"row {row + 1} of {path.name}"
+    try:
+        table = pyarrow.parquet.read_table(path, columns=wanted)
+        table.validate(full=True)
+        return table.to_pandas(ignore_metadata=True), lambda row: f"row {row + 1} of {path.name}"
+    except pa.ArrowException as error:  # most of them are a ValueError too, but not all
+        raise ValueError(error) from error
 
 
 def _read_text(pd: Any, path: Path, separator: str, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:

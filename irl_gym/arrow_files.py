@@ -93,7 +93,8 @@ def _content(array: Any) -> int:
         return sum(map(_content, array.flatten() if pa.types.is_struct(array.type) else [array.flatten()]))
     if not pa.types.is_dictionary(array.type):
         return array.nbytes
-    return pyarrow.compute.sum(pyarrow.compute.binary_length(array.dictionary).take(array.indices)).as_py() or 0
+    compute: Any = pyarrow.compute
+    return compute.sum(compute.binary_length(array.dictionary).take(array.indices)).as_py() or 0
 
 
 def _next(messages: Any) -> Any:

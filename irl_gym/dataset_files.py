@@ -9,10 +9,8 @@ file names.
 """
 
 import json
-import math
 import os
 from collections.abc import Iterator
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +82,8 @@ def check_episodes(folder: Path, data_format: str, numbers: Iterator[int]) -> No
         check_hdf5(folder / HDF5)
         with h5py.File(folder / HDF5, "r") as file:
             for number in numbers:
-                seed = read_attributes(file[f"episode_{number}"]).get("seed", 0)  # Minari makes 1 of 1.5
-                if not isinstance(seed, Real) or not 0 <= seed < math.inf or int(seed) != seed:
+                seed = read_attributes(file, f"episode_{number}").get("seed", np.int64(0))  # Minari makes 1 of 1.5
+                if not isinstance(seed, np.integer | np.floating) or not 0 <= seed < np.inf or int(seed) != seed:
                     raise _no_seed(f"episode {number}", seed)
         return
     for number in numbers:

@@ -60,20 +60,20 @@ def check_hdf5(path: str | os.PathLike) -> None:
         raise DamagedFile(f"it is damaged: {' '.join(str(error).split())[:200] or type(error).__name__}") from error
 
 
-def read_attributes(group: h5py.Group) -> dict[str, Any]:
-    """What is told of a group of a file that was looked through.
+def read_attributes(file: Any, name: str) -> dict[str, Any]:
+    """What is told of a group of an open file that was looked through.
 
     Raises:
         DamagedFile: something else than numbers, booleans or text, or more text than the file is in proportion to.
     """
-    size, most = os.path.getsize(group.file.filename), 0
-    for name in group.attrs:
-        one = group.attrs.get_id(name)
+    told, size, most = file[name].attrs, os.path.getsize(file.filename), 0
+    for key in told:
+        one = told.get_id(key)
         if not _plain(one.get_type()):
-            raise DamagedFile(f"{group.name[:80]} has the attribute {name[:80]!r}, and no numbers, booleans or text in it")
+            raise DamagedFile(f"{name[:80]} has the attribute {key[:80]!r}, and no numbers, booleans or text in it")
         most += one.get_space().get_simple_extent_npoints() * (size if _varies(one.get_type()) else one.get_type().get_size())
     check_declared(most, size)  # an attribute is read whole, and each of its texts may be nearly the file
-    return dict(group.attrs)
+    return dict(told)
 
 
 def _objects(root: Any) -> Iterator[tuple[str, Any]]:

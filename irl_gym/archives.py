@@ -44,6 +44,11 @@ _BROKEN = (
 """What zipfile and NumPy's reader of headers raise of other bytes than they expect."""
 
 
+def most_of(size: int) -> int:
+    """Bytes that a file of so many may take in memory."""
+    return max(FREE, RATIO * size)
+
+
 def check_declared(declared: int, size: int) -> None:
     """Check, before it is unpacked, that what a file declares is in proportion to its size.
 
@@ -54,7 +59,7 @@ def check_declared(declared: int, size: int) -> None:
     Raises:
         DamagedFile: it is not.
     """
-    most = max(FREE, RATIO * size)
+    most = most_of(size)
     if declared > most:
         raise DamagedFile(
             f"it has {size:,} bytes and declares {declared:,}: expected at most {most:,}. If it is yours, write it without "

@@ -16,6 +16,7 @@ from irl_gym.hdf5_files import BROKEN
 
 _MAGIC = 8
 """Bytes before the first message."""
+_SHARING = ("list_view", "large_list_view", "string_view", "binary_view", "run_end_encoded")
 _HEADER, _BUFFERS, _COMPRESSION = 2, 2, 3
 """Which fields of a message, and of the batch that is its header."""
 
@@ -37,8 +38,11 @@ def check_arrow(path: Path) -> None:
             check_declared(declared, path.stat().st_size)
             file.seek(0)
             batches = pa.ipc.open_file(file)
+            held = 0
             for i in range(batches.num_record_batches):
                 batches.get_batch(i).validate(full=True)
+                held += sum(map(_content, batches.get_batch(i).columns))
+                check_declared(held, path.stat().st_size)
     except DamagedFile:
         raise
     except (pa.ArrowException, struct.error, StopIteration, *BROKEN) as error:
@@ -46,7 +50,8 @@ def check_arrow(path: Path) -> None:
 
 
 def check_parquet(path: Path) -> None:
-    """Check that a Parquet file declares no more than it can hold.
+    """Check that a Parquet file declares no more than it can hold. Texts, all of which may be one that lies in the file once,
+    are counted a few at a time.
 
     Raises:
         DamagedFile: it does, or is none.
@@ -56,12 +61,40 @@ def check_parquet(path: Path) -> None:
 
     try:
         about, size = pyarrow.parquet.read_metadata(path), path.stat().st_size
-        check_declared(sum(about.row_group(i).total_byte_size for i in range(about.num_row_groups)), size)
-        check_declared(8 * about.num_rows * about.num_columns, size)
+        groups = [about.row_group(i) for i in range(about.num_row_groups)]
+        check_declared(sum(one.total_byte_size for one in groups), size)
+        columns = [about.schema.column(i) for i in range(about.num_columns)]
+        declared = 8 * about.num_rows * about.num_columns  # a number that is often there lies in the file once
+        declared += sum(one.column(i).num_values * max(8, columns[i].length) for one in groups for i in range(len(columns)))
+        check_declared(declared, size)
+        texts = [one.path for one in columns if one.physical_type == "BYTE_ARRAY"]
+        with pyarrow.parquet.ParquetFile(path, read_dictionary=texts) as file:
+            for batch in file.iter_batches(1024, columns=texts) if texts else ():
+                declared += sum(map(_content, batch.columns))
+                check_declared(declared, size)
     except DamagedFile:
         raise
     except (pa.ArrowException, *BROKEN) as error:
         raise DamagedFile(f"{path.parent.name}/{path.name} is damaged: {' '.join(str(error).split())[:200]}") from error
+
+
+def _content(array: Any) -> int:
+    """Bytes that an array takes where each value stands for itself.
+
+    Raises:
+        DamagedFile: it is of another kind in which one value may stand for many.
+    """
+    import pyarrow as pa
+    import pyarrow.compute
+
+    if str(array.type).startswith(_SHARING):
+        raise DamagedFile(f"it holds {str(array.type)[:80]}, in which one value may stand for many")
+    if pa.types.is_nested(array.type):
+        return sum(map(_content, array.flatten() if pa.types.is_struct(array.type) else [array.flatten()]))
+    if not pa.types.is_dictionary(array.type):
+        return array.nbytes
+    compute: Any = pyarrow.compute
+    return compute.sum(compute.binary_length(array.dictionary).take(array.indices)).as_py() or 0
 
 
 def _next(messages: Any) -> Any:

@@ -172,7 +172,8 @@ def _bounds(env: gym.Env, coordinates: Sequence[int] | None) -> tuple[list[float
         return low.tolist(), (low + space.nvec.ravel() - 1).tolist(), None
     if not isinstance(space, spaces.Box):
         raise InvalidFeatures(
-            f"observations are of {space}: expected a Box, Discrete or MultiDiscrete. Flatten them with Gymnasium's wrapper."
+            f"observations are of {space}: expected a Box, Discrete or MultiDiscrete. Flatten them, with "
+            "`gymnasium.wrappers.FlattenObservation(env)`."
         )
     low, high = space.low.ravel().astype(float), space.high.ravel().astype(float)
     if not (np.abs([low, high]) < 1e30).all():  # CartPole's velocities are unbounded, or bounded by float32's largest
@@ -189,11 +190,13 @@ def _grid(env: gym.Env, n: int) -> Sequence[int] | None:
 def _known_bounds(env: gym.Env, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     try:
         known = coordinates_of(env.unwrapped)
-    except NotSettable as error:
-        raise InvalidFeatures(f"observations are unbounded: {low.tolist()} to {high.tolist()} ({error}).") from error
-    if len(known.low) != len(low) or not np.isfinite([known.low, known.high]).all():
+    except NotSettable:
+        known = None
+    if known is None or len(known.low) != len(low) or not np.isfinite([known.low, known.high]).all():
+        box = f"gymnasium.spaces.Box(-10, 10, {env.observation_space.shape})"
         raise InvalidFeatures(
-            f"observations range from {low.tolist()} to {high.tolist()}: expected finite bounds, to put features "
-            "between. Rescale them with Gymnasium's RescaleObservation, or give features in Python."
+            f"observations range from {low.tolist()} to {high.tolist()}: expected finite bounds, to put features between. Clip "
+            "them where they seldom go, as with `gymnasium.wrappers.TransformObservation(env, lambda seen: numpy.clip(seen, "
+            f"-10, 10), {box})`; or give features in Python."
         )
     return known.low, known.high

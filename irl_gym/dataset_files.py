@@ -14,13 +14,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from gymnasium import spaces
 from minari.dataset.minari_dataset import parse_dataset_id
 
 from irl_gym.arrow_files import check_arrow, check_parquet
 from irl_gym.errors import DamagedFile
-from irl_gym.hdf5_files import check_hdf5
+from irl_gym.hdf5_files import check_hdf5, read_attributes
 from irl_gym.told_spaces import told_space
 
 HDF5 = "main_data.hdf5"
@@ -79,6 +80,11 @@ def check_episodes(folder: Path, data_format: str, numbers: Iterator[int]) -> No
     if data_format == "hdf5":
         inside(folder, folder / HDF5)
         check_hdf5(folder / HDF5)
+        with h5py.File(folder / HDF5, "r") as file:
+            for number in numbers:
+                seed = read_attributes(file, f"episode_{number}").get("seed", np.int64(0))  # Minari makes 1 of 1.5
+                if not isinstance(seed, np.integer | np.floating) or not 0 <= seed < np.inf or int(seed) != seed:
+                    raise _no_seed(f"episode {number}", seed)
         return
     for number in numbers:
         inside(folder, folder / str(number), of_files=False)
@@ -106,8 +112,12 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
             raise DamagedFile(f"{here} has {name} of shape {one.shape} and dtype {one.dtype}, and no numbers (T,)")
     seed = metadata.get("seed")
     if seed is not None and (type(seed) is not int or seed < 0):
-        raise DamagedFile(f"{here} has the seed {seed!r:.80}, and no whole number of at least 0")
+        raise _no_seed(here, seed)
     _check_observed(here, episode.observations, observations)
+
+
+def _no_seed(here: str, seed: Any) -> DamagedFile:
+    return DamagedFile(f"{here} has the seed {seed!s:.80}, and no whole number of at least 0")
 
 
 def _check_observed(here: str, found: Any, space: Any) -> None:

@@ -7,6 +7,7 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 import contextlib
 import os
 from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -158,17 +159,32 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
     with minari_root(root) as base:
         check_id(dataset_id)
         if not (base / dataset_id).exists():
-            found = sorted(minari.list_local_datasets())
-            there = f"There are {', '.join(found[:5])}." if found else "There is none."
+            found = _ids(base)
+            close = get_close_matches(dataset_id, found, 5)
+            near = (
+                f"Name one of these: {', '.join(close or found[:5])}; or the root" if found else "There is none: name the root"
+            )
             raise DatasetMissing(
-                f"dataset {dataset_id!r} is not under {base}: expected one of the datasets there. {there} Name the root "
-                "folder, or set MINARI_DATASETS_PATH."
+                f"dataset {dataset_id!r} is not under {base}: expected one of the datasets there. {near} folder that it "
+                "is under, or set MINARI_DATASETS_PATH to that."
             )
         try:
             check_told(base / dataset_id / "data")
             return minari.load_dataset(dataset_id)
         except BROKEN as error:
             raise _broken(dataset_id, error) from error
+
+
+def _ids(base: Path) -> list[str]:
+    """The ids of the datasets under a root. Minari's own listing stumbles over a folder whose name is no id."""
+    found = []
+    for place, folders, _ in os.walk(base):
+        if "data" in folders and Path(place) != base:
+            folders.clear()
+            with contextlib.suppress(InvalidParameter):
+                found.append(check_id(Path(place).relative_to(base).as_posix()))
+        folders[:] = [one for one in folders if not one.startswith(".")]
+    return sorted(found)
 
 
 def read_minari(
@@ -203,11 +219,15 @@ def read_minari(
         dataset = load_minari(dataset, root=root)
     actions: Any = dataset.spec.action_space
     if not isinstance(actions, spaces.Discrete):
-        raise NotDiscrete(f"dataset {dataset.spec.dataset_id!r} has actions {actions}: expected Discrete.")
+        raise NotDiscrete(
+            f"dataset {dataset.spec.dataset_id!r} has actions {actions}: expected Discrete, since irl_gym learns from finitely "
+            "many. Read it with Minari, give each action a number, and the episodes to `irl_gym.imports.from_arrays`."
+        )
     if states is not None and dataset.spec.observation_space != states.space:
         raise DatasetMismatch(
             f"dataset {dataset.spec.dataset_id!r} was recorded in an environment with observations "
-            f"{dataset.spec.observation_space}: expected {states.space}. Is it another environment's?"
+            f"{dataset.spec.observation_space}: expected {states.space}. Give the states of that environment's table, or the "
+            "dataset of another."
         )
     if env is not None:
         _check_recorded(dataset, env)

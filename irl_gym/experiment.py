@@ -184,6 +184,8 @@ def _sha256(content: bytes) -> str:
 def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
     """Arguments of an environment given as text: `name=value` pairs, each value json or plain text; or one json object.
 
+    `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
+
     Raises:
         InvalidParameter: neither.
     """

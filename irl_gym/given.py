@@ -121,5 +121,5 @@ def check_agent(agent: Agent, observations: Any, actions: spaces.Space) -> None:
     if not fits:
         raise DatasetMismatch(
             f"the expert is an agent for observations {found} and actions {taken}: expected {observations} and {actions}, the "
-            "environment's. Is it another environment's?"
+            "environment's. Name the environment that it was trained in, or train it in this one."
         ) from cause

@@ -3,7 +3,8 @@
 An HDF5 file can name other files whose bytes stand for its numbers, link to objects elsewhere or in a circle, hold pointers in
 place of numbers, and declare terabytes in a few bytes. Neither Minari nor D4RL writes any of these. So the tree is walked from
 its root, without reading a number, and everything but groups, and arrays of numbers, booleans or text that lie in the file
-itself, is refused.
+itself, is refused. Values of any length, which are text and pictures, may all be one that lies in the file once: what they
+take together is counted, a few at a time.
 """
 
 import os
@@ -13,7 +14,7 @@ from typing import Any
 
 import h5py
 
-from irl_gym.archives import check_declared
+from irl_gym.archives import check_declared, most_of
 from irl_gym.errors import DamagedFile
 
 _low: Any = h5py  # what its high level is made of, which type checkers do not see
@@ -23,6 +24,8 @@ FILTERS = frozenset((1, 2, 3, 4, 5, 6, 32_000))
 """HDF5's own, and h5py's lzf; any other is code that the library would look for and load."""
 MOST_BYTES = 1 << 16
 """Of one number or text."""
+OF_ANY_LENGTH = 128
+"""Bytes that a value of any length takes beside its content: it is an object of Python's."""
 BROKEN = (
     OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, AssertionError, ArithmeticError, RuntimeError,
     MemoryError,
@@ -39,14 +42,38 @@ def check_hdf5(path: str | os.PathLike) -> None:
     """
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} is no file: expected one in HDF5.")
+    size, declared, of_any_length = os.path.getsize(path), 0, []
     try:
         with h5py.File(path, "r") as file:
-            declared = sum(_size(name, one) for name, one in _objects(file.id) if isinstance(one, _low.h5d.DatasetID))
-        check_declared(declared, os.path.getsize(path))
+            for name, one in _objects(file.id):
+                if isinstance(one, _low.h5d.DatasetID):
+                    declared += _size(name, one)
+                    of_any_length += [one] if _varies(one.get_type()) else []
+            check_declared(declared, size)
+            for one in of_any_length:
+                for content in _contents(one, most_of(size) // size):
+                    declared += content
+                    check_declared(declared, size)
     except DamagedFile:
         raise
     except BROKEN as error:
         raise DamagedFile(f"it is damaged: {' '.join(str(error).split())[:200] or type(error).__name__}") from error
+
+
+def read_attributes(file: Any, name: str) -> dict[str, Any]:
+    """What is told of a group of an open file that was looked through.
+
+    Raises:
+        DamagedFile: something else than numbers, booleans or text, or more text than the file is in proportion to.
+    """
+    told, size, most = file[name].attrs, os.path.getsize(file.filename), 0
+    for key in told:
+        one = told.get_id(key)
+        if not _plain(one.get_type()):
+            raise DamagedFile(f"{name[:80]} has the attribute {key[:80]!r}, and no numbers, booleans or text in it")
+        most += one.get_space().get_simple_extent_npoints() * (size if _varies(one.get_type()) else one.get_type().get_size())
+    check_declared(most, size)  # an attribute is read whole, and each of its texts may be nearly the file
+    return dict(told)
 
 
 def _objects(root: Any) -> Iterator[tuple[str, Any]]:
@@ -86,7 +113,25 @@ def _size(name: str, dataset: Any) -> int:
         raise DamagedFile(f"{name[:80]} is packed by a plug-in, which is not loaded")
     if not _plain(kind) or space.get_simple_extent_type() == _low.h5s.NULL:
         raise DamagedFile(f"{name[:80]} holds neither numbers, booleans nor text")
-    return space.get_simple_extent_npoints() * kind.get_size()
+    varies = _varies(kind)
+    if varies and space.get_simple_extent_ndims() > 1:
+        raise DamagedFile(f"{name[:80]} has text or pictures of any length in more than one row, as no dataset has")
+    return space.get_simple_extent_npoints() * (OF_ANY_LENGTH if varies else kind.get_size())
+
+
+def _contents(dataset: Any, together: int) -> Iterator[int]:
+    """Bytes of the content of values of any length, some at a time; each of them takes no more than the file."""
+    array = h5py.Dataset(dataset)
+    if not array.shape:
+        yield len(array[()])
+        return
+    for first in range(0, array.shape[0], together):
+        yield sum(map(len, array[first : first + together]))
+
+
+def _varies(kind: Any) -> bool:
+    """Is this a type of values of any length, which lie elsewhere in the file?"""
+    return kind.get_class() == _low.h5t.VLEN or (kind.get_class() == _low.h5t.STRING and kind.is_variable_str())
 
 
 def _plain(kind: Any) -> bool:

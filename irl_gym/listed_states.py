@@ -98,8 +98,8 @@ class ListedStates(Numbering):
             values = numbers[unknown[0]].tolist()
             shown = values[0] if len(values) == 1 else values if len(values) <= 12 else f"{values[:12]}..."
             raise UnknownObservation(
-                f"observation {shown} is not a state of this table: expected one of its {len(self.numbers)}. The table was "
-                "made without it: make it again with a larger limit or more samples."
+                f"observation {shown} is not a state of this table: expected one of its {len(self.numbers)}. If the table was "
+                "counted, count it again with more samples; one that was enumerated has all that its environment shows."
             )
         return rows
 

@@ -108,9 +108,11 @@ def unkept(spec: EnvSpec | None) -> str | None:
     return None
 
 
-def identity(spec: EnvSpec | None) -> tuple[Any, ...] | None:
+def identity(spec: EnvSpec | None) -> list[Any] | None:
     """What makes an environment this one: its id, arguments and wrappers, but for how it is shown and who watches it."""
-    return None if spec is None else _named(spec, _defaults(spec.id) | spec.kwargs)
+    if spec is None:
+        return None
+    return json.loads(json.dumps(_named(spec, _defaults(spec.id) | spec.kwargs)), parse_constant=str)  # NaN is not equal to NaN
 
 
 def _named(spec: EnvSpec, arguments: dict[str, Any]) -> tuple[Any, ...]:
@@ -148,8 +150,8 @@ def _plain(value: Any) -> Any:
     return json.loads(json.dumps(value, default=plain_json))
 
 
-def check_id(dataset_id: str) -> None:
-    """Check that Minari takes an id.
+def check_id(dataset_id: str) -> str:
+    """Check that Minari takes an id, and return it.
 
     Raises:
         InvalidParameter: it is malformed.
@@ -159,6 +161,7 @@ def check_id(dataset_id: str) -> None:
     except (ValueError, TypeError) as error:
         why = f" ({error})" if isinstance(error, ValueError) else ""  # the other is Minari's stumble over a missing version
         raise InvalidParameter(f"dataset id {dataset_id!r} is malformed{why}: expected namespace/name-v0.") from error
+    return dataset_id
 
 
 def check_free(base: Path, dataset_id: str) -> None:

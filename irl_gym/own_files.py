@@ -3,7 +3,7 @@
 Who writes a file writes a new one beside it, under a name that nobody can foresee, and renames it. Who writes several
 writes them into a new folder that is nobody else's. Both are locked while their writer lives, so that what a killed writer
 left is told from what is being written: it is removed when something is next written beside it, or when the folder is next
-held.
+held. Nothing is forced onto the disk, so that this holds for kills and not for power cuts (docs/security.md).
 
 Locks are the system's (flock), which lets go when a process ends, however it does. On Windows, and on a file system that has no
 locks, there are none: there two processes in one folder are not kept apart, and what a killed writer left stays.

@@ -47,6 +47,7 @@ class RunReader:
 
     def __init__(self, path: Path):
         self.path, self.command = path, None
+        self.files: set[str] = set()
 
     def incomplete(self, what: str) -> RunIncomplete:
         """The error of a run that has to be continued."""
@@ -66,6 +67,7 @@ class RunReader:
 
     def read(self, name: str, read: Callable[[Path], Any]) -> Any:
         """The content of a file."""
+        self.files.add(name)
         try:
             return read(self.path / name)
         except FileNotFoundError as error:

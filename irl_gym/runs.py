@@ -73,7 +73,7 @@ class Run:
     """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
     exact, whether these are all pieces, and gap, what others can be worth."""
     vouched: bool
-    """Are digests recorded of the files that are read here? They were compared. False: an earlier version made the run."""
+    """Is a digest recorded of each file that was read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
     """Is what the metrics say of the expert's loss under the reward computed from these files, not the run's record?"""
 
@@ -158,7 +158,7 @@ def _read(path: Path, table: Tabulation | None) -> Run:
         diagnosis=reader.maybe("diagnosis.json", read_json),
         widths=reader.maybe("ambiguity.npz", lambda one: _part(one, "widths")),
         lambda_path=reader.maybe("ambiguity.npz", lambda one: _part(one, "path")),
-        vouched=START in records and all("sha256" in one for one in records.values()),
+        vouched=reader.files <= {name for one in records.values() for name in one.get("sha256", ())},
     )  # fmt: skip
     _check_shapes(run, reader)
     return _with_proof(run, reader)

@@ -69,6 +69,22 @@ class Slippery(Corridor):
         return self.moved(1 - int(action) if self.slips() else int(action))
 
 
+class Shows(Corridor):
+    """Shows what it is told to show of its cell."""
+
+    def __init__(self, space, show):
+        super().__init__()
+        self.observation_space, self.show = space, show
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.show(self.cell), {}
+
+    def step(self, action):
+        _, *rest = self.moved(int(action))
+        return self.show(self.cell), *rest
+
+
 class Board(gym.Env):
     """size x size cells, four moves, from the corner to the opposite one."""
 

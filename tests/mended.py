@@ -1,19 +1,18 @@
-"""Mends as errors name them: what stands between backquotes, evaluated."""
+"""Mends as errors name them: what stands between backquotes, evaluated; and which of them a file names."""
 
+import ast
 import re
+from pathlib import Path
 
 import gymnasium
 import numpy
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
 from gymnasium import spaces
 
+from irl_gym import errors
 from irl_gym.discretize import discretize
-from irl_gym.errors import (
-    HiddenState,
-    UnknownObservation,
-)
+from irl_gym.errors import HiddenState, UnknownObservation
 from irl_gym.reveal import Reveal
 from irl_gym.tabulate import tabulate
 
@@ -23,6 +22,30 @@ GAMMA = 0.9
 def mends(message):
     """The code that a message names, in its order."""
     return re.findall(r"`([^`]*)`", message)
+
+
+def named(*files):
+    """Patterns of the mends that errors of these files of the library name: what follows what was expected, if no question."""
+    for file in files:
+        for node in ast.walk(ast.parse((Path(errors.__file__).parent / file).read_text())):
+            if isinstance(node, ast.Call) and hasattr(errors, getattr(node.func, "id", "")) and node.args:
+                texts = [_text(node.args[0]).partition(": expected")[2].partition(". ")[2]]
+            elif isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "").lower() == "mend":
+                one = node.value
+                texts = map(_text, [one.body, one.orelse] if isinstance(one, ast.IfExp) else [one])
+            else:
+                continue
+            yield from (
+                ".*".join(map(re.escape, one.split("\0")))
+                for one in texts
+                if re.search("[a-z]", one) and not one.strip().endswith("?")
+            )
+
+
+def _text(node):
+    """A text of the code, with a sign in place of what is filled in."""
+    parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+    return "".join(one.value if isinstance(getattr(one, "value", 0), str) else "\0" for one in parts)
 
 
 def done(code, env):
@@ -60,22 +83,6 @@ def revealed(env):
             else:
                 shown |= eval(more[1])
     raise AssertionError("the mends lead nowhere")
-
-
-class Shows(Corridor):
-    """Shows its cell in some other way."""
-
-    def __init__(self, space, show):
-        super().__init__()
-        self.observation_space, self.show = space, show
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return self.show(self.cell), {}
-
-    def step(self, action):
-        _, *rest = self.moved(int(action))
-        return self.show(self.cell), *rest
 
 
 WORDS = ["first", "second", "third", "fourth", "fifth", "sixth", "last"]

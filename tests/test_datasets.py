@@ -148,13 +148,15 @@ def test_an_unknown_id_is_a_missing_file(tmp_path):
         next(read_minari("nothing-v0", root=tmp_path))
 
 
-def test_a_missing_dataset_names_those_that_are_there(root):
-    with pytest.raises(DatasetMissing, match=f"'nothing-v0' is not under .* There are {ID}"):
+def test_a_missing_dataset_names_those_that_are_there_and_no_folder_whose_name_is_no_id(root):
+    for name in ("odd name", "me/no-version", "."):
+        (root / name / "data").mkdir(parents=True)
+    with pytest.raises(DatasetMissing, match=f"'nothing-v0' is not under .* Name one of these: {ID};"):
         load_minari("nothing-v0", root=root)
 
 
 def test_a_missing_dataset_says_when_there_is_none(tmp_path):
-    with pytest.raises(DatasetMissing, match=r"There is none. Name the root folder, or set MINARI_DATASETS_PATH"):
+    with pytest.raises(DatasetMissing, match=r"There is none: name the root folder .*, or set MINARI_DATASETS_PATH"):
         load_minari("nothing-v0", root=tmp_path)
 
 

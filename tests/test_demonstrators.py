@@ -81,7 +81,7 @@ def test_an_agent_of_a_zip_acts(tmp_path):
 
 def test_an_agent_of_another_environment_is_refused(tmp_path):
     PPO("MlpPolicy", "CartPole-v1", n_steps=8, batch_size=8, device="cpu").save(tmp_path / "agent.zip")
-    with pytest.raises(DatasetMismatch, match="Is it another environment's"):
+    with pytest.raises(DatasetMismatch, match="Name the environment that it was trained in"):
         made(tmp_path, "FrozenLake-v1", str(tmp_path / "agent.zip"))
 
 

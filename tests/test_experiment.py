@@ -29,6 +29,7 @@ def lake(**kwargs):
         (('{"size": [3, 4]}',), {"size": [3, 4]}),
         (('desc=["SF", "FG"]',), {"desc": ["SF", "FG"]}),
         (("name=a=b",), {"name": "a=b"}),
+        (("cap=Infinity", "low=-Infinity", "far=1e999"), {"cap": np.inf, "low": -np.inf, "far": np.inf}),
     ],
 )
 def test_parse_keywords_reads(parts, expected):

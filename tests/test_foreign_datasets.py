@@ -14,7 +14,7 @@ from irl_gym.arrow_files import check_arrow
 from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrations import Episode
 from irl_gym.errors import InvalidDemonstrations
-from irl_gym.hdf5_files import DEEPEST, check_hdf5
+from irl_gym.hdf5_files import DEEPEST
 from irl_gym.imports import from_d4rl
 
 ID = "lake-v0"
@@ -137,23 +137,6 @@ def test_a_tree_that_no_d4rl_file_has_is_refused_before_it_is_read(tmp_path, dam
         from_d4rl(tmp_path / "a.hdf5", env=gym.make("FrozenLake-v1"))
 
 
-def test_a_file_that_declares_much_and_holds_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(archives, "FREE", 1 << 10)
-    with h5py.File(tmp_path / "a.hdf5", "w") as file:
-        file["x"] = np.zeros(100_000)
-    check_hdf5(tmp_path / "a.hdf5")
-
-
-def test_text_booleans_and_pictures_are_no_damage(tmp_path):
-    with h5py.File(tmp_path / "a.hdf5", "w") as file:
-        file.create_dataset("text", data=["a", "b"], dtype=h5py.string_dtype())
-        file["truth"] = np.array([True])
-        file.create_dataset("pictures", (2,), dtype=h5py.vlen_dtype(np.uint8))
-        file["packed"] = np.zeros(2)
-        file.create_dataset("small", data=np.arange(10), compression="lzf", shuffle=True, fletcher32=True)
-    check_hdf5(tmp_path / "a.hdf5")
-
-
 def test_files_that_are_links_out_of_the_dataset_are_refused(root):
     data, outside = root / ID / "data", root / "outside"
     name = "main_data.hdf5" if (data / "main_data.hdf5").exists() else "0/part-0.arrow"
@@ -245,13 +228,21 @@ def test_an_episode_that_is_not_of_the_datasets_spaces_is_refused(hdf5, part, va
         list(read_minari(ID, root=root))
 
 
-@pytest.mark.parametrize("seed", [np.inf, -3.0])
+@pytest.mark.parametrize("seed", [np.inf, -3.0, 1.5, "7", [1, 2], True])
 def test_a_seed_that_is_none_is_refused(hdf5, seed):
     root, path = hdf5
     with h5py.File(path, "a") as file:
         file["episode_1"].attrs["seed"] = seed
-    with pytest.raises(InvalidDemonstrations, match="cannot be read"):
+    with pytest.raises(InvalidDemonstrations, match=r"cannot be read .*episode 1 has the seed .*, and no whole number"):
         list(read_minari(ID, root=root))
+
+
+def test_a_whole_seed_that_is_a_float_or_missing_is_taken(hdf5):
+    root, path = hdf5
+    with h5py.File(path, "a") as file:
+        file["episode_0"].attrs["seed"] = 7.0
+        del file["episode_1"].attrs["seed"]
+    assert [one.seed for one in read_minari(ID, root=root)] == [7, None, 2]
 
 
 def test_arrow_whose_places_lead_outside_is_refused(arrow):

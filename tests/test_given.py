@@ -98,7 +98,7 @@ def test_an_agent_trained_on_rows_is_shown_rows(toy_text, tmp_path, space, one):
 @pytest.mark.parametrize("space", [None, PAIRS])
 def test_an_agent_of_another_environment_is_refused(toy_text, tmp_path, space):
     agent = SHORT.plan(make_vec_env("CartPole-v1", 1), gamma=0.9)
-    with pytest.raises(DatasetMismatch, match="Is it another environment's"):
+    with pytest.raises(DatasetMismatch, match="Name the environment that it was trained in"):
         kept(agent, tmp_path).plan(lake(toy_text, space, show_rows=space is not None), gamma=0.9)
 
 

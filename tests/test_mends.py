@@ -6,10 +6,11 @@ import threading
 import gymnasium
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import Corridor, Shows
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import StickyAction
-from mended import GAMMA, SHOWN, Shows, done, error_of, mends, revealed
+from mended import GAMMA, SHOWN, done, error_of, mends, revealed
 
 from irl_gym.counting import Interaction
 from irl_gym.enumeration.table import Enumeration
@@ -207,6 +208,12 @@ def test_an_argument_that_is_spelled_out_or_left_out_is_the_same_environment():
     specs = [gymnasium.make("FrozenLake-v1", **given).spec for given in ({}, {"is_slippery": True}, {"map_name": "4x4"})]
     other = gymnasium.make("FrozenLake-v1", is_slippery=False).spec
     assert identity(specs[0]) == identity(specs[1]) == identity(specs[2]) != identity(other)
+
+
+def test_an_argument_that_is_not_a_number_is_the_same_argument():
+    spec = gymnasium.make("FrozenLake-v1").spec
+    spec.kwargs["success_rate"] = np.nan
+    assert identity(spec) == identity(EnvSpec.from_json(spec.to_json())) != identity(gymnasium.spec("FrozenLake-v1"))
 
 
 THIRDS = np.full((3, 3), np.float32(1 / 3))

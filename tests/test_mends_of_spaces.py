@@ -1,18 +1,19 @@
-"""The mends that errors about observations and actions name are executed, and serve."""
+"""The mends that errors about observations, actions and features name are executed, and serve."""
+
+import re
 
 import gymnasium
 import numpy as np
 import pytest
-from enumeration_envs import Corridor
+from enumeration_envs import Corridor, Shows
 from gymnasium import spaces
-from mended import GAMMA, SHOWN, Shows, done, error_of, mends
+from mended import GAMMA, SHOWN, done, error_of, mends, named
 
+from irl_gym.bases import RadialBasis
+from irl_gym.choices import features_named
 from irl_gym.counting import Interaction, interact
 from irl_gym.discretize import discretize
-from irl_gym.errors import (
-    InvalidParameter,
-    NotDiscrete,
-)
+from irl_gym.errors import InvalidFeatures, InvalidParameter, NotDiscrete
 from irl_gym.planners import ValueIteration
 from irl_gym.simulator import Simulator
 from irl_gym.tabulate import tabulate
@@ -81,3 +82,60 @@ def test_actions_that_are_numbered_as_the_error_says_make_a_table_of_cells():
     with pytest.raises(NotDiscrete) as caught:
         discretize(env, gamma=GAMMA, bins=3)
     assert discretize(done(mends(str(caught.value))[0], env), gamma=GAMMA, bins=3).mdp.n_actions == 5
+
+
+# --- features ---
+
+
+def shows(space):
+    return Shows(space, None)
+
+
+def radial(env, **how):
+    return features_named("radial", env, **how)
+
+
+def by_code(env):
+    return done(mends(message(radial, env))[0], env)
+
+
+def message(breaks, *given):
+    with pytest.raises(InvalidFeatures) as caught:
+        breaks(*given)
+    return str(caught.value)
+
+
+TAXI, FREE = gymnasium.make("Taxi-v4"), spaces.Box(-np.inf, np.inf, (2,))
+FEATURES = [
+    ("Choose a smaller size,",
+     lambda: radial(shows(spaces.Box(0, 1, (3,))), size=50),
+     lambda: radial(shows(spaces.Box(0, 1, (3,))), size=5)),
+    ("show fewer coordinates,",
+     lambda: radial(shows(spaces.Box(0, 1, (3,))), size=50),
+     lambda: radial(shows(spaces.Box(0, 1, (2,))), size=50)),
+    ("or give features in Python.",
+     lambda: radial(shows(spaces.Box(0, 1, (3,))), size=50), lambda: RadialBasis.grid([0] * 3, [1] * 3, 9)),
+    ("Flatten them, with `gymnasium.wrappers.FlattenObservation(env)`.",
+     lambda: radial(shows(spaces.Tuple([spaces.Discrete(2)] * 2))),
+     lambda: radial(by_code(shows(spaces.Tuple([spaces.Discrete(2)] * 2))))),
+    ("Clip them where they seldom go, as with `gymnasium.wrappers.TransformObservation(env, lambda seen: numpy.clip(seen, -10, "
+     "10), gymnasium.spaces.Box(-10, 10, (2,)))`;",
+     lambda: radial(shows(FREE)), lambda: radial(by_code(shows(FREE)))),
+    ("or give features in Python.",
+     lambda: radial(shows(FREE)), lambda: RadialBasis.grid([-10] * 2, [10] * 2, 5)),
+    ("Name them,",
+     lambda: radial(TAXI),
+     lambda: radial(TAXI, size=2, coordinates=(5, 5, 5, 4))),
+    ("or choose one-hot.",
+     lambda: radial(TAXI), lambda: features_named("one-hot", TAXI)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("says", "breaks", "mended"), FEATURES)
+def test_a_mend_that_an_error_about_features_names_serves(says, breaks, mended):
+    assert says in message(breaks) and mended()
+
+
+def test_every_mend_that_an_error_about_features_names_is_executed():
+    said = " ".join(says for says, *_ in FEATURES)
+    assert not [one for one in named("choices.py") if not re.search(one, said)]

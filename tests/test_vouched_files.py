@@ -157,6 +157,22 @@ def test_a_record_that_names_files_outside_of_the_run_is_none(copied, monkeypatc
         read_run(copied)
 
 
+def test_a_file_that_a_power_cut_left_empty_is_named_and_made_again_as_the_error_says(copied):
+    (copied / "reward.npz").write_bytes(b"")
+    with pytest.raises(RunConflict, match=r"reward\.npz is not the file that the run left.* Delete it, and its stage is run"):
+        recover_and_retrain(ASKED, copied)
+    (copied / "reward.npz").unlink()
+    recover_and_retrain(ASKED, copied)
+    assert read_run(copied).vouched
+
+
+@pytest.mark.parametrize("stage", ["start", "reward", "record"])
+def test_a_record_whose_digests_are_empty_vouches_for_nothing(copied, stage):
+    kept = copied / ".stages" / f"{stage}.json"
+    write_json(kept, {**read_json(kept), "sha256": {}})
+    assert not read_run(copied).vouched
+
+
 @pytest.mark.parametrize("told", [[], "all", 7, None, {"reward.npz": 7}, {"reward.npz": None}])
 def test_digests_that_are_none_are_not_believed(copied, told):
     record = json.loads((copied / ".stages" / "reward.json").read_text())

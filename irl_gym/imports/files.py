@@ -70,15 +70,19 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
 
 
 def _read_parquet(path: Path, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
+    import pyarrow as pa
     import pyarrow.parquet
 
     check_parquet(path)
     there = pyarrow.parquet.read_schema(path).names
     _check_columns(path.name, there, columns, optional)
     wanted = [one for one in dict.fromkeys(columns.values()) if one in there]
-    table = pyarrow.parquet.read_table(path, columns=wanted)
-    table.validate(full=True)
-    return table.to_pandas(ignore_metadata=True), lambda row: f"row {row + 1} of {path.name}"
+    try:
+        table = pyarrow.parquet.read_table(path, columns=wanted)
+        table.validate(full=True)
+        return table.to_pandas(ignore_metadata=True), lambda row: f"row {row + 1} of {path.name}"
+    except pa.ArrowException as error:  # most of them are a ValueError too, but not all
+        raise ValueError(error) from error
 
 
 def _read_text(pd: Any, path: Path, separator: str, columns: dict[str, str], optional: frozenset[str]) -> tuple[Any, Name]:
@@ -130,7 +134,8 @@ def _check_header(where: str, separator: str, header: list[str], columns: dict[s
     other = max((one for one in NAMES if one != separator), key=text.count)
     if text.lstrip().startswith("#"):
         named = set(re.split(r"[#\s,;|]+", text)) & set(wanted)
-        mend = "Take the '#' away." if named else "Delete the comments, or pass pandas.read_csv(..., comment='#')."
+        apart = f"Take the '#' away, and pass pandas.read_csv(..., sep={other!r})."
+        mend = apart if named else "Delete the comments, or pass pandas.read_csv(..., comment='#')."
         what = f"a header, such as {wanted}, before any comment. {mend}"
     elif text.count(other) >= len(header) and (other != " " or len(header) == 1):
         suffix = next((f"Let the file end in {one}, or pass" for one, sign in SEPARATORS.items() if sign == other), "Pass")

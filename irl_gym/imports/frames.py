@@ -144,9 +144,10 @@ def _order(columns: dict[str, np.ndarray], n: int, name: Name) -> tuple[np.ndarr
     if len(wrong):
         at = int(wrong[0])
         again = f" again, as {name(int(order[at]))} has" if steps[at] == steps[at + 1] else ""
+        mend = "Give each of two episodes an id of its own, or pass" if again else "Pass"
         raise InvalidDemonstrations(
             f"{name(int(order[at + 1]))} has step {steps[at + 1]}{again}: expected step {steps[at] + 1} after step {steps[at]} "
-            "of its episode. Pass step=None if the rows are in order and the column is no counter."
+            f"of its episode. {mend} step=None if the rows are in order and the column is no counter."
         )
     return order, offsets_at(np.append(~same, True))
 
@@ -160,7 +161,9 @@ def _factorized(column: np.ndarray, what: str, name: Name) -> tuple[np.ndarray, 
     except TypeError as error:
         raise InvalidDemonstrations(f"the column of {what}s holds lists ({error}): expected numbers or text.") from error
     if (codes < 0).any():
-        raise InvalidDemonstrations(f"{name(int(np.argmax(codes < 0)))} has no {what}: expected one. Is the row empty?")
+        raise InvalidDemonstrations(
+            f"{name(int(np.argmax(codes < 0)))} has no {what}: expected one. Fill it in, or leave the row out."
+        )
     return codes, values
 
 

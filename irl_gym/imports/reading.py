@@ -68,7 +68,10 @@ def reading(
     if action_space is None and env is not None:
         action_space = env.action_space
     if action_space is not None and not isinstance(action_space, spaces.Discrete):
-        raise NotDiscrete(f"the actions are {action_space}: expected Discrete. Irl_gym learns from finitely many actions.")
+        raise NotDiscrete(
+            f"the actions are {action_space}: expected Discrete, since irl_gym learns from finitely many. Give each action the "
+            "number of a bin, and n_actions with space in place of env and action_space."
+        )
     if n_actions is not None:
         count = int(checked_number("n_actions", n_actions, "a whole number of at least 1", least=1, whole=True))
         if action_space is not None and count != int(action_space.n):

@@ -208,7 +208,8 @@ class Rows:
             row = int(rows[np.argmax(np.any(differ, axis=0))])
             raise InvalidDemonstrations(
                 f"{self.name(row)} has another next observation than the observation of {self.name(row + 1)}, which follows it "
-                "in the same episode: expected the same. Are rows missing, or does an episode end there?"
+                "in the same episode: expected the same. If rows are missing or an episode ends there, give those after it the "
+                "id of another episode."
             )
 
 

@@ -125,7 +125,7 @@ def test_a_column_of_words_is_refused_at_its_first_row(read):
 
 def test_a_text_that_is_missing_in_the_first_row_is_named(read):
     text = LOG.replace("0,0,0,1", "0,0,,1").replace("0,1,4", '0,1,"(4)"')
-    with pytest.raises(InvalidDemonstrations, match=r"^row 1 \(line 2 of log.csv\) has no observation: .* Is the row empty"):
+    with pytest.raises(InvalidDemonstrations, match=r"^row 1 \(line 2 of log.csv\) has no observation: .* Fill it in"):
         read(text)
 
 

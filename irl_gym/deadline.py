@@ -5,6 +5,7 @@ import time
 from dataclasses import dataclass
 
 from irl_gym.checks import checked_number
+from irl_gym.errors import SolverTimeout
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,23 @@ class Deadline:
     def left(self) -> float:
         """Seconds, at least 0; infinite for no limit."""
         return max(self.until - time.monotonic(), 0.0)
+
+    def check(self) -> None:
+        """Go on only while there is time.
+
+        Raises:
+            SolverTimeout: there is none left.
+        """
+        if not self.left:
+            raise self.late()
+
+    def late(self, reasons: str = "") -> SolverTimeout:
+        """The error of a fit whose time is up."""
+        why = f" ({reasons})" if reasons else ""
+        return SolverTimeout(
+            f"no answer in {self.seconds} s, which all programs of a fit have together{why}: raise time_limit, or choose the "
+            "other solver."
+        )
 
 
 NEVER = Deadline(None, math.inf)

@@ -8,9 +8,10 @@ not rest on the factors. Axes: S states.
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
+from irl_gym import native
 from irl_gym._typing import Sparse, Vector
+from irl_gym.killable import made
 
 EPSILON = float(np.finfo(np.float64).eps)
 MOVED = 1e-3
@@ -30,11 +31,7 @@ class Discounted:
         self._P = sp.csr_array(gamma * P_pi)
         self._terms = (int(np.diff(self._P.indptr).max(initial=0)) + 8 + sums) * EPSILON
         identity = sp.eye_array(P_pi.shape[0], format="csc")
-        # Its diagonal dominates each row, so no pivots are sought; that order halves the factors of SuperLU's default.
-        self._factor = splu(
-            sp.csc_matrix(identity - self._P),
-            permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True},
-        )  # fmt: skip
+        self._factor = made(P_pi.shape[0] ** 3, native.factors, sp.csc_matrix(identity - self._P))
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """X with (I - gamma P_pi) x = right."""
@@ -42,7 +39,7 @@ class Discounted:
 
     def solve_transposed(self, right: np.ndarray) -> np.ndarray:
         """X with (I - gamma P_pi)^T x = right."""
-        return self._factor.solve(np.ascontiguousarray(right, dtype=np.float64), trans="T")
+        return self._factor.solve(np.ascontiguousarray(right, dtype=np.float64), "T")
 
     def above(self, right: Vector) -> Vector:
         """(S,) at least (I - gamma P_pi)^-1 right, for right >= 0, and at most about 0.1 % more; infinite where not proved."""

@@ -15,6 +15,7 @@ from irl_gym.checks import checked_number, float_array
 from irl_gym.discounted import EPSILON, Discounted
 from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.howard import Optimum, howard, sweeps_of
+from irl_gym.killable import check_limit
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution
 from irl_gym.precise import horizon
@@ -139,6 +140,7 @@ def value_iteration(
     tie = tolerance / steps / 4
     V, error = np.zeros(mdp.n_states), np.inf
     for iteration in range(1, max_iterations + 1):
+        check_limit()
         Q = backup(mdp, R, V)
         improved = Q.max(axis=1)
         error = mdp.gamma * steps * float(np.abs(improved - V).max()) + rounding

@@ -14,6 +14,7 @@ import numpy as np
 from irl_gym.coordinates import IntegerCoordinate
 from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, checked_features
+from irl_gym.killable import check_limit
 from irl_gym.mdp import check_discount
 from irl_gym.physics import Physics, physics_of
 from irl_gym.policies import Policy
@@ -103,6 +104,7 @@ class GenerativeModel:
         sums = checked_features(features, observe(here))
         weight = 1.0
         for _ in range(horizon):
+            check_limit()
             if not alive.any():
                 break
             weight *= self.gamma

@@ -18,6 +18,7 @@ from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.closing import close
 from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
 from irl_gym.features import FeatureMap, batch_size, checked_features, over_rows
+from irl_gym.killable import check_limit
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import check_discount
 from irl_gym.planners import Planner, ValueIteration
@@ -134,6 +135,7 @@ class Simulator:
         policy = policy or RandomPolicy(self.n_actions, generator(seed))
         total = np.zeros((n, features.n_features))
         for time, who, phi in self._seen(policy, features, n, horizon, seed):
+            check_limit()
             total[who] += self.gamma**time * phi
         return total
 

@@ -4,22 +4,25 @@ HiGHS (simplex) answers small programs with a vertex, exact to rounding; Clarabe
 sparse ones: Ng & Russell's program on a 50x50 grid (gamma 0.99) took HiGHS 9.8 s and Clarabel 0.4 s. Clarabel factorises by
 qdldl: its own choice, faer, took six times as long on a 100x100 grid. When one solver fails the other is tried once, never
 without a limit. All programs of a fit, and all attempts, share one limit of time: a solver has what those before it left. It
-looks at the clock between its iterations, and on a sparse table one is short; where factors fill up (10,000 states whose
-successors are drawn at random) one can take minutes.
+looks at the clock between its iterations; where one could be long, since factors fill up (10,000 states whose successors are
+drawn at random), it works in a process that is killed when the time is up (`killable`).
 """
 
 import enum
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import cvxpy as cp
 import numpy as np
 
+from irl_gym import native
 from irl_gym.checks import is_word
 from irl_gym.deadline import NEVER, Deadline
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
+from irl_gym.killable import called, within
 
 SolverName = Literal["auto", "clarabel", "highs"]
 SMALL = 1_500
@@ -77,19 +80,19 @@ class Answer:
 class _Solver:
     cvxpy_name: str
     options: dict[str, Any]
-    time_option: str
+    run: Callable[[native.Program, dict[str, Any], float], Any]
 
 
 _SOLVERS = {
     "clarabel": _Solver(
         cp.CLARABEL,
         {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "max_iter": 500, "direct_solve_method": "qdldl"},
-        "time_limit",
+        native.clarabel,
     ),
     "highs": _Solver(
         cp.HIGHS,
         {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9},
-        "time_limit",
+        native.highs,
     ),
 }
 _OTHER = {"clarabel": "highs", "highs": "clarabel"}
@@ -118,13 +121,6 @@ class Solving:
         if not is_word(solver, "auto", *_SOLVERS):
             raise InvalidParameter(f"solver is {solver!r}: expected 'auto', 'clarabel' or 'highs'.")
         return cls(solver, Deadline.after(time_limit))
-
-    def late(self, reasons: str) -> SolverTimeout:
-        """The error of a fit whose time is up."""
-        return SolverTimeout(
-            f"no answer in {self.deadline.seconds} s, which all programs of a fit have together ({reasons}): raise time_limit, "
-            "or choose the other solver."
-        )
 
 
 AUTO = Solving()
@@ -173,7 +169,7 @@ def solve(problem: cp.Problem, *, rows: int, solving: Solving = AUTO) -> Answer:
             deadline = Deadline.after(max(SECOND_SECONDS, SECOND_SHARE * seconds))
     reasons = "; ".join(failures)
     if not solving.deadline.left:
-        raise solving.late(reasons)
+        raise solving.deadline.late(reasons)
     longer = " Give time_limit, for the second to have longer." if not deadline.left else ""
     raise SolverFailed(f"no solver gave an answer ({reasons}): rescale the problem, or report it with its table.{longer}")
 
@@ -188,11 +184,13 @@ def _attempt(problem: cp.Problem, name: str, deadline: Deadline) -> str | None:
             warnings.simplefilter("ignore")  # an inaccurate answer is a Status, not a warning
             compiled: Any = problem.get_problem_data(chosen.cvxpy_name, solver_opts=chosen.options)
             data, chain, inverse = compiled
-            left = deadline.left  # what compiling has left of it
-            if not left:
-                return late
-            options = chosen.options | ({} if deadline is NEVER else {chosen.time_option: left})
-            problem.unpack_results(chain.solve_via_data(problem, data, solver_opts=options), chain, inverse)
+            bounds = data.get("lower_bounds"), data.get("upper_bounds")
+            program = data["c"], data["A"].tocsc(), data["b"], int(data["dims"].zero), *bounds
+            with within(deadline):
+                found = called(_operations(program), chosen.run, program, chosen.options, deadline.until)
+            problem.unpack_results(found, chain, inverse)
+    except SolverTimeout:
+        return late
     except (cp.SolverError, ValueError) as error:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         return text if deadline.left else f"{late} ({text})"
@@ -201,3 +199,8 @@ def _attempt(problem: cp.Problem, name: str, deadline: Deadline) -> str | None:
     if problem.status == cp.USER_LIMIT:
         return "iteration limit" if deadline.left else late
     return str(problem.status)
+
+
+def _operations(program: native.Program) -> float:
+    """Of a factorisation in which nothing is sparse: more than one iteration can take."""
+    return float(sum(program[1].shape)) ** 3 / 3

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import reference
+import scipy.sparse as sp
 from hypothesis import strategies as st
 
 from irl_gym.mdp import TabularMDP
@@ -110,3 +111,11 @@ def paper_grid(gamma: float = 0.9) -> Model:
     R = np.eye(n * n)[goal]
     mdp = TabularMDP.from_dense(P, gamma, np.eye(n * n)[n * (n - 1)])
     return Model(mdp, P, R, reference.optimal_actions(P, gamma, P @ R))
+
+
+def scattered(S: int, successors: int, A: int = 4, gamma: float = 0.99) -> tuple[TabularMDP, np.ndarray]:
+    """A sparse table whose factors fill up, since successors are drawn anywhere, and a reward (S, A)."""
+    rng = np.random.default_rng(0)
+    rows, columns = np.repeat(np.arange(S * A), successors), rng.integers(S, size=S * A * successors)
+    P = sp.csr_array((rng.dirichlet(np.ones(successors), size=S * A).ravel(), (rows, columns)), shape=(S * A, S))
+    return TabularMDP(P, gamma, np.full(S, 1 / S)), (P @ rng.normal(size=S)).reshape(S, A)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from irl_gym import deadline, solvers
-from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.dynamic_programming import policy_iteration, value_iteration
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 from irl_gym.features import OneHot
 from irl_gym.learners.feature import FeatureLP
@@ -137,14 +137,47 @@ def test_a_second_attempt_is_never_without_a_limit(solver, monkeypatch):
     assert solve(diet(), rows=2, solving=Solving.begun(solver, 600.0)).attempts == 2  # the mend that it names
 
 
+@both
+def test_a_solver_is_given_what_cvxpy_gives_it(solver):
+    chosen, told = solvers._SOLVERS[solver], []
+    for ours in (True, False):
+        x = cp.Variable(3, nonneg=True)
+        problem = cp.Problem(cp.Minimize(cp.sum(x) - 2 * x[1]), [x[0] + x[2] == 3, x[1] + x[2] <= 4, x <= 2])
+        if ours:
+            solve(problem, rows=3, solving=Solving(solver))
+        else:
+            problem.solve(solver=chosen.cvxpy_name, **chosen.options)
+        told.append([x.value.tobytes(), *(np.asarray(one.dual_value).tobytes() for one in problem.constraints)])
+    assert told[0] == told[1]
+
+
+limited = pytest.mark.parametrize(
+    "learner", [FiniteLP, partial(FiniteLP, slack=5.0), partial(FiniteLP, reward_on="state-action")]
+)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("learner", [FiniteLP, partial(FiniteLP, slack=5.0), partial(FiniteLP, reward_on="state-action")])
+@limited
 @pytest.mark.parametrize(("size", "limit"), [(100, 2.0), (200, 10.0)])
 def test_a_time_limit_is_kept_within_a_fifth_on_a_grid(learner, size, limit):
     """10,000 and 40,000 states, limits that are reached; wall time, so it is a bar."""
     env = gym.make("irl_gym_envs:irl_gym/GridWorld-v0", size=size).unwrapped
     mdp = env.mdp(0.99)
     expert = policy_iteration(mdp, env.reward.expected(mdp)).policy
+    start = time.perf_counter()
+    with pytest.raises(SolverTimeout):
+        learner(time_limit=limit).fit(mdp, expert)
+    assert time.perf_counter() - start < 1.2 * limit
+
+
+@pytest.mark.slow
+@limited
+@pytest.mark.parametrize("successors", [3, 5])
+@pytest.mark.parametrize(("states", "limit"), [(2_000, 2.0), (10_000, 3.0), (40_000, 10.0)])
+def test_a_time_limit_is_kept_within_a_fifth_where_factors_fill_up(learner, states, limit, successors):
+    """Successors drawn at random: one iteration can take minutes. Wall time, so it is a bar."""
+    mdp, reward = models.scattered(states, successors)
+    expert = value_iteration(mdp, reward, sweeps=20, tolerance=1e-3).policy
     start = time.perf_counter()
     with pytest.raises(SolverTimeout):
         learner(time_limit=limit).fit(mdp, expert)

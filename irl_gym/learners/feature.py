@@ -35,6 +35,7 @@ from irl_gym.discounted import Discounted
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
+from irl_gym.killable import within
 from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
 from irl_gym.learners.feature_program import NOTHING, SolvedFeatures, solve_features
@@ -77,7 +78,8 @@ class FeatureLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit."""
+    """Seconds for the whole fit: all its programs, all attempts at them, and the certificate, together; None for no limit.
+    Kept within a fifth, as `FiniteLP.time_limit` is; a caller's features are not cut."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
 
@@ -115,10 +117,12 @@ class FeatureLP:
             NotSettable: the environment of a generative model cannot be set to a state.
             SolverTimeout, SolverFailed: no answer.
         """
-        if isinstance(world, GenerativeModel):
-            return self._fit_model(world, expert)
-        if isinstance(world, TabularMDP):
-            return self._fit_table(world, expert, states)
+        solving = Solving.begun(self.solver, self.time_limit)
+        with within(solving.deadline):
+            if isinstance(world, GenerativeModel):
+                return self._fit_model(world, expert, solving)
+            if isinstance(world, TabularMDP):
+                return self._fit_table(world, expert, states, solving)
         raise InvalidMDP(
             f"the world is a {type(world).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
             "GenerativeModel(env, gamma)."
@@ -129,7 +133,9 @@ class FeatureLP:
         """The features, as a map."""
         return as_features(self.features)
 
-    def _fit_table(self, mdp: TabularMDP, expert: Any, states: States | None) -> IRLResult[LinearReward, FeatureCertificate]:
+    def _fit_table(
+        self, mdp: TabularMDP, expert: Any, states: States | None, solving: Solving
+    ) -> IRLResult[LinearReward, FeatureCertificate]:
         if states is not None and not isinstance(states, States):
             raise InvalidParameter(
                 f"states is {states!r}: expected a numbering, such as `tabulate(...).states`, or None for rows."
@@ -140,7 +146,6 @@ class FeatureLP:
         if states is None:
             check_length(self.phi, mdp.n_states)
         S_0: Any = self.S_0
-        solving = Solving.begun(self.solver, self.time_limit)
         expert, known = completed(expert, mdp.n_states)
         discounted = Discounted(mdp.P_pi(expert), mdp.gamma)
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
@@ -153,12 +158,14 @@ class FeatureLP:
         certificate = self._certificate(found, solved, judged, None)
         return IRLResult(reward, solved.status, certificate.objective, certificate, self._stats(weights, found))
 
-    def _fit_model(self, model: GenerativeModel, expert: Policy) -> IRLResult[LinearReward, FeatureCertificate]:
+    def _fit_model(
+        self, model: GenerativeModel, expert: Policy, solving: Solving
+    ) -> IRLResult[LinearReward, FeatureCertificate]:
         if not isinstance(expert, Policy):
             raise InvalidPolicy(
                 f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
             )
-        S_0, solving = self._states_of(model), Solving.begun(self.solver, self.time_limit)
+        S_0 = self._states_of(model)
         horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)
         found = rows_of_model(
             model,

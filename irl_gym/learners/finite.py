@@ -34,6 +34,7 @@ from irl_gym.certificate import Certificate, certify
 from irl_gym.checks import checked_number, float_array, is_word
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
+from irl_gym.killable import within
 from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.feature_rows import completed
@@ -67,7 +68,9 @@ class FiniteLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit."""
+    """Seconds for the whole fit: all its programs, all attempts at them, and the certificate, together; None for no limit.
+    Kept within a fifth, also where factors fill up: what could be long works in a process that is ended then (`killable`). What
+    no clock is looked at for is the making of the matrices, about a second for a million entries."""
     slack: float | None = None
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
@@ -109,13 +112,19 @@ class FiniteLP:
             DegenerateExpert: (4) leaves no reward with a positive margin anywhere.
             SolverTimeout, SolverFailed: no answer.
         """
-        checked_mdp(mdp)
+        solving = Solving.begun(self.solver, self.time_limit)
+        with within(solving.deadline):
+            return self._fit(checked_mdp(mdp), expert, visits, solving)
+
+    def _fit(
+        self, mdp: TabularMDP, expert: Any, visits: np.ndarray | None, solving: Solving
+    ) -> IRLResult[TabularReward, Certificate]:
         known_expert, known = completed(expert, mdp.n_states)
         acting = mdp.reachable & ~mdp.terminal
         visits = _checked_visits(visits, known & acting)
         if self.slack is not None or (acting & ~known).any():
-            return PartialTask(self, mdp, known_expert, known, visits).fit()
-        task, y_l1 = _Task(self, mdp, known_expert), None
+            return PartialTask(self, mdp, known_expert, known, visits, solving).fit()
+        task, y_l1 = _Task(self, mdp, known_expert, solving), None
         largest = None if self.margin_cap is None else task.uniform_margin()
         lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
         l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
@@ -143,15 +152,17 @@ class FiniteLP:
             InvalidPolicy: an expert of the wrong shape or content.
             DegenerateExpert: no reward has a positive margin, so lambda_0 would be 0.
         """
-        expert, known = completed(expert, mdp.n_states)
-        if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
-            partial = PartialTask(self, mdp, expert, known, None)
-            partial.settle()
-            return partial.lambda_0()
-        task = _Task(self, mdp, expert)
-        if self.margin_cap is not None:
-            task.uniform_margin()
-        return task.lambda_0()
+        solving = Solving.begun(self.solver, self.time_limit)
+        with within(solving.deadline):
+            expert, known = completed(expert, mdp.n_states)
+            if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
+                partial = PartialTask(self, mdp, expert, known, None, solving)
+                partial.settle()
+                return partial.lambda_0()
+            task = _Task(self, mdp, expert, solving)
+            if self.margin_cap is not None:
+                task.uniform_margin()
+            return task.lambda_0()
 
 
 def _checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
@@ -174,9 +185,8 @@ def _checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
 class _Task:
     """One fit: the reachable part of the MDP, the rows of (4), and the states that count."""
 
-    def __init__(self, learner: FiniteLP, mdp: TabularMDP, expert: Any):
-        self.learner, self.mdp, self.expert = learner, mdp, expert
-        self.solving = Solving.begun(learner.solver, learner.time_limit)
+    def __init__(self, learner: FiniteLP, mdp: TabularMDP, expert: Any, solving: Solving):
+        self.learner, self.mdp, self.expert, self.solving = learner, mdp, expert, solving
         mdp.mixing(expert)  # checks all states, reachable or not
         self.rows = np.flatnonzero(mdp.reachable)
         self.part = mdp.restrict(self.rows)

@@ -48,14 +48,17 @@ class PartialTask:
         distribution: (S, A) the expert, anything where it is not known.
         known: (S,) states where it is known.
         visits: (S,) how often each state was visited, or None.
+        solving: with which solver, and until when.
 
     Raises:
         DegenerateExpert: nothing to compare.
     """
 
-    def __init__(self, learner: "FiniteLP", mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None):
-        self.learner, self.mdp, self.visits = learner, mdp, visits
-        self.solving = Solving.begun(learner.solver, learner.time_limit)
+    def __init__(
+        self, learner: "FiniteLP", mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None,
+        solving: Solving,
+    ):  # fmt: skip
+        self.learner, self.mdp, self.visits, self.solving = learner, mdp, visits, solving
         mdp.mixing(distribution)  # checks all states
         self.rows = np.flatnonzero(mdp.reachable)
         part = mdp.restrict(self.rows)

@@ -27,6 +27,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.feature_sums import discounted_sums
 from irl_gym.features import FeatureMap, as_features, checked_features
 from irl_gym.generative import least_horizon, truncation_bound
+from irl_gym.killable import within
 from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.estimates import Estimate, nearest, usable
 from irl_gym.learners.expressible import uniform_margin
@@ -91,8 +92,8 @@ class TrajectoryLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for the whole fit: all its programs, and all attempts at them, together; None for no limit.
-    Planning is not cut: the time is up when the next program would begin."""
+    """Seconds for the whole fit: its programs, all attempts at them, planning by value iteration and trajectories; None for
+    no limit. An agent's training is not cut: the time is up when the next program would begin."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))
@@ -153,8 +154,9 @@ class TrajectoryLP:
             program = {"slope": float(self.penalty), "l1": float(self.l1), "cap": self._cap(rows, solving)}
             weights = best_weights(rows, **program, solving=solving)
             reward = LinearReward(weights.alpha, self.phi, {"learner": "TrajectoryLP", "scaling": self.phi.scaling})
-            policy = world.plan(reward, seed=self.seed + number)
-            sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
+            with within(solving.deadline):
+                policy = world.plan(reward, seed=self.seed + number)
+                sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
             newest = Estimate.of(sums)
             cut = truncation_bound(world.gamma, horizon, r_unit)
             certificate = self._certificate(rows, weights, program, theirs, found, newest, horizon, cut)

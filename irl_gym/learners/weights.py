@@ -19,7 +19,9 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
+from irl_gym import native
 from irl_gym.features import blocks
+from irl_gym.killable import called, check_limit
 from irl_gym.solvers import AUTO, Answer, Solving, solve
 
 ROUNDING = 1e-12
@@ -55,8 +57,9 @@ class Rows:
         """Rank of d: how many directions of alpha the expert says anything about."""
         triangle = np.zeros((0, self.d.shape[1]))
         for part in blocks(*self.d.shape):  # by QR: d^T d would square the condition, and lose what is below 1e-8
-            triangle = np.linalg.qr(np.concatenate([triangle, self.d[part] / self.scale]), mode="r")
-        values = np.linalg.svd(triangle, compute_uv=False)
+            check_limit()
+            triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, self.d[part] / self.scale]), mode="r"))
+        values = called(10.0 * max(triangle.shape) ** 3, native.singular_values, triangle)
         return int((values > ROUNDING * values.max(initial=0.0)).sum())
 
     def least(self, alpha: np.ndarray) -> np.ndarray:

@@ -18,6 +18,14 @@ def pytest_configure(config):
     config.addinivalue_line("filterwarnings", "ignore::beartype.roar.BeartypeDecorHintPep585DeprecationWarning")
 
 
+@pytest.fixture(autouse=True, scope="session")
+def logs_of_sb3(tmp_path_factory):
+    """Models that tests train by themselves log into pytest's own folders; else SB3 leaves a folder of each in the system's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
+        yield
+
+
 KWARGS = {
     "FrozenLake 4x4 slippery": ("FrozenLake-v1", {"map_name": "4x4", "is_slippery": True}),
     "FrozenLake 4x4": ("FrozenLake-v1", {"map_name": "4x4", "is_slippery": False}),

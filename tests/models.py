@@ -110,3 +110,18 @@ def paper_grid(gamma: float = 0.9) -> Model:
     R = np.eye(n * n)[goal]
     mdp = TabularMDP.from_dense(P, gamma, np.eye(n * n)[n * (n - 1)])
     return Model(mdp, P, R, reference.optimal_actions(P, gamma, P @ R))
+
+
+def random_features(seed, S):
+    """(S, K) features of any K from 1 to S + 2, and a sample of at least half of the states."""
+    rng = np.random.default_rng([seed, 1])
+    Phi = rng.normal(size=(S, rng.integers(1, S + 3)))
+    return Phi, np.sort(rng.choice(S, size=rng.integers(S // 2, S + 1), replace=False))
+
+
+def with_features(seed, kind):
+    """A random model of 8 states, features and a sample."""
+    return random_model(seed, S=8, kind=kind), *random_features(seed, 8)
+
+
+featured = st.builds(with_features, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(KINDS))

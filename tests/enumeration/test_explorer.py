@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from enumeration_envs import Board, Corridor, Racetrack, same_table
 from gymnasium import spaces
+from mended import Shows
 
 from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.explorer import Explorer
@@ -122,22 +123,6 @@ def test_an_environment_that_cannot_be_copied_is_refused_by_the_name_of_what_can
 def test_an_environment_that_can_be_set_need_not_be_copied():
     found, plain = table_of(Handed()), table_of(Corridor())
     assert (found.mdp.P != plain.mdp.P).nnz == 0 and np.array_equal(found.reward.values, plain.reward.values)
-
-
-class Shows(Corridor):
-    """Shows what it is told to show of its cell."""
-
-    def __init__(self, space, show):
-        super().__init__()
-        self.observation_space, self.show = space, show
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return self.show(self.cell), {}
-
-    def step(self, action):
-        _, *rest = self.moved(int(action))
-        return self.show(self.cell), *rest
 
 
 WRONG = {

@@ -149,7 +149,8 @@ def from_data(loop: "Loop") -> bool:
 def shown_told(record: Mapping[str, Any]) -> dict[str, Any]:
     """What is told of the demonstrations, from their stage's record."""
     more = {key: record[key] for key in LOST if key in record}
-    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **more}
+    named = {"dataset": "dataset_id", "episodes": "episodes"}
+    return {told: record[key] for told, key in named.items() if key in record} | more
 
 
 def _trained(loop: "Loop") -> dict[str, Any]:
@@ -199,10 +200,10 @@ def reward_told(certificate: Mapping[str, Any]) -> dict[str, Any]:
 
 def learned_told(record: Mapping[str, Any]) -> dict[str, Any]:
     """Whose the reward is, and what the program said, from its stage's record."""
-    stats = record["stats"]
+    stats = record.get("stats", {})
     rounds = {"rounds": len(stats["rounds"])} if "rounds" in stats else {}
-    told = {key: stats[key] for key in ("best_round", "best_by") if key in stats}
-    return {"learner": record["learner"], "status": record["status"], **rounds, **told}
+    told = {key: one[key] for one, keys in ((record, ("learner", "status")), (stats, BEST)) for key in keys if key in one}
+    return told | rounds
 
 
 def judged_reward(table: Tabulation, learned: TabularReward, scale: Scale, horizon: int | None) -> dict[str, Any]:
@@ -231,6 +232,8 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
+BEST = ("best_round", "best_by")
+"""What the algorithm for trajectories tells of its rounds."""
 TRAINED = ("trained_return", "vecnormalize")
 """What `FromFile.trained` says of an expert's training."""
 STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")

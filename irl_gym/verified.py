@@ -48,8 +48,8 @@ WITHIN = 1e-6
 """Share of the largest value by which two computations of one value may differ."""
 MOST_STEPS = 100_000
 """Of a horizon that values are computed again for."""
-WORDED = ("errors", "hidden_state", "checked")
-"""Of a table, what is told in words, which another version may choose otherwise."""
+EVIDENCE = ("method", "counted", "error", "reward_error", "value_error", "errors", "hidden_state", "checked")
+"""Of a table, what is told as table.npz has it now: another version may word or bound it otherwise."""
 
 
 @dataclass(frozen=True)
@@ -124,14 +124,16 @@ def claims(
     """
     given = config.get("dataset") is not None
     known = {"given": given, "episodes_only": given or bool(config.get("epsilon"))}
-    yield Claim("config.json", {"reward": {"learner": (config.get("learner") or {}).get("type")}, "demonstrations": known})
+    learner = {"learner": config["learner"]["type"]} if (config.get("learner") or {}).get("type") else {}
+    yield Claim("config.json", {"reward": learner, "demonstrations": known})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
-    yield Claim(".stages/agent.json", {"training": {"environment_steps": stages["agent"].get("environment_steps")}})
+    taken = {key: one for key, one in stages["agent"].items() if key == "environment_steps"}
+    yield Claim(".stages/agent.json", {"training": taken})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
         told = table_told(table, metrics["table"].get("horizon") if given else None)
-        yield Claim("table.npz", {"table": {key: one for key, one in told.items() if key not in WORDED}})
+        yield Claim("table.npz", {"table": {key: one for key, one in told.items() if key not in EVIDENCE}})
 
 
 def recomputed(
@@ -222,7 +224,7 @@ def again(
         "expert_value": {} if given else {"episodes": None, "low": values["expert"], "high": values["expert"]},
         "reward": judged_reward(table, reward, scale, horizon),
         "training": settled(curve, scale),
-        "table": {key: one for key, one in table_told(table, horizon).items() if key in WORDED},
+        "table": {key: one for key, one in table_told(table, horizon).items() if key in EVIDENCE},
     }
     return claimed, now
 

@@ -3,6 +3,7 @@
 No wall time is in it, so that the same seed gives the same bytes; seconds are in the stages' records.
 """
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from irl_gym.policies import as_distribution, support
 from irl_gym.rewards import TabularReward
 from irl_gym.scores import Scale, half_width
 from irl_gym.shares import GOOD, returns_of, share_of_return
+from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
@@ -67,12 +69,7 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
     expert, random = (returns_of(rows[name]) for name in ("expert", "random"))
     for row in rows.values():
         row["return_share"] = share_of_return(returns_of(row), expert, random)
-    curve = learning_curve(loop)
-    points = np.column_stack([curve.steps, curve.value])
-    training: dict[str, Any] = {"environment_steps": loop.stage("agent")["environment_steps"]}
-    for good in (GOOD, NEARLY_ALL):
-        settled = None if scale.reason is not None else settled_at(points, scale.random, scale.expert, good)
-        training[f"steps_to_{good:g}"] = settled
+    training = {"environment_steps": loop.stage("agent")["environment_steps"], **settled(learning_curve(loop), scale)}
     low, high = scale.interval
     return {
         "policies": rows,
@@ -80,8 +77,8 @@ def evaluate(loop: "Loop") -> dict[str, Any]:
         "expert_value": {"episodes": scale.episodes, "low": low, "high": high},
         "reward": _reward(loop, scale),
         "training": training,
-        "table": _table(world) if isinstance(world, TableWorld) else None,
-        "demonstrations": _recorded(loop),
+        "table": table_told(world.table, world.horizon) if isinstance(world, TableWorld) else None,
+        "demonstrations": {**shown_told(loop.stage("demonstrations")), **_known_by(loop), **_trained(loop)},
     }
 
 
@@ -102,11 +99,15 @@ def _scale(loop: "Loop", earned: np.ndarray) -> Scale:
     world, told = loop.world, from_data(loop)
     random = world.value(world.random)
     expert = float(earned.mean()) if told else world.value(loop.expert)
-    # What a factorisation of I - gamma P leaves of values, its condition number being about 1 / (1 - gamma).
-    rounding = 64 * EPSILON / (1 - world.gamma) * max(abs(random), abs(expert)) if isinstance(world, TableWorld) else 0.0
+    rounding = rounding_of(world.gamma, random, expert) if isinstance(world, TableWorld) else 0.0
     if not told:
         return Scale(random, expert, rounding, gamma=world.gamma)
     return Scale(random, expert, rounding, half_width(earned, _without_chance(loop)), earned.size, world.gamma)
+
+
+def rounding_of(gamma: float, *values: float) -> float:
+    """What a factorisation of I - gamma P leaves of values, its condition number being about 1 / (1 - gamma)."""
+    return 64 * EPSILON / (1 - gamma) * max(map(abs, values))
 
 
 def _without_chance(loop: "Loop") -> bool:
@@ -145,11 +146,15 @@ def from_data(loop: "Loop") -> bool:
     return loop.experiment.dataset is not None
 
 
-def _recorded(loop: "Loop") -> dict[str, Any]:
-    record = loop.stage("demonstrations")
+def shown_told(record: Mapping[str, Any]) -> dict[str, Any]:
+    """What is told of the demonstrations, from their stage's record."""
     more = {key: record[key] for key in LOST if key in record}
-    more |= {key: value for key, value in loop.stage("expert").items() if key in TRAINED}
-    return {"dataset": record["dataset_id"], "episodes": record["episodes"], **_known_by(loop), **more}
+    named = {"dataset": "dataset_id", "episodes": "episodes"}
+    return {told: record[key] for told, key in named.items() if key in record} | more
+
+
+def _trained(loop: "Loop") -> dict[str, Any]:
+    return {key: value for key, value in loop.stage("expert").items() if key in TRAINED}
 
 
 def _known_by(loop: "Loop") -> dict[str, bool]:
@@ -180,27 +185,38 @@ def good_actions(mdp: TabularMDP, expert: np.ndarray | None, best: Optimum) -> A
 
 
 def _reward(loop: "Loop", scale: Scale) -> dict[str, Any]:
-    """The certificate's numbers, the sizes of its lists of states, and on tables what the worst tie loses."""
-    told: dict[str, Any] = {"learner": loop.stage("reward")["learner"], "status": loop.stage("reward")["status"]}
-    for key, value in loop.certificate.items():
-        if key in STATE_LISTS:
-            told[f"{key}_states"] = len(value)
-        elif not isinstance(value, list):
-            told[key] = value
-    world = loop.world
+    """The certificate's numbers, what its stage recorded, and on tables what the worst tie loses."""
+    told, world = reward_told(loop.certificate) | learned_told(loop.stage("reward")), loop.world
     if isinstance(world, TableWorld):
-        told["reward_on"] = "state" if world.tabular(loop.learned).on_states else "state-action"
-        worst = metrics.worst_tie(world.table.mdp, world.tabular(loop.learned), world.table.reward)
-        value = worst.value if world.horizon is None else world.value(worst.policy)
-        told |= {
-            "worst_tie_value": value,
-            "worst_tie_regret": scale.expert - value,
-            "worst_tie_regret_share": scale.share(scale.expert - value),
-            **_apart(world.table.mdp, world.table.reward, world.tabular(loop.learned)),
-        }
-    stats = loop.stage("reward")["stats"]
+        told |= judged_reward(world.table, world.tabular(loop.learned), scale, world.horizon)
+    return told
+
+
+def reward_told(certificate: Mapping[str, Any]) -> dict[str, Any]:
+    """The certificate's numbers, and the sizes of its lists of states."""
+    sizes = {f"{key}_states": len(value) for key, value in certificate.items() if key in STATE_LISTS}
+    return sizes | {key: value for key, value in certificate.items() if not isinstance(value, list)}
+
+
+def learned_told(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Whose the reward is, and what the program said, from its stage's record."""
+    stats = record.get("stats", {})
     rounds = {"rounds": len(stats["rounds"])} if "rounds" in stats else {}
-    return told | rounds | {key: stats[key] for key in ("best_round", "best_by") if key in stats}
+    told = {key: one[key] for one, keys in ((record, ("learner", "status")), (stats, BEST)) for key in keys if key in one}
+    return told | rounds
+
+
+def judged_reward(table: Tabulation, learned: TabularReward, scale: Scale, horizon: int | None) -> dict[str, Any]:
+    """What the worst tie under a reward loses, and how far it is from the true one."""
+    worst = metrics.worst_tie(table.mdp, learned, table.reward)
+    value = worst.value if horizon is None else metrics.policy_value(table.mdp, table.reward, worst.policy, horizon)
+    return {
+        "reward_on": "state" if learned.on_states else "state-action",
+        "worst_tie_value": value,
+        "worst_tie_regret": scale.expert - value,
+        "worst_tie_regret_share": scale.share(scale.expert - value),
+        **_apart(table.mdp, table.reward, learned),
+    }
 
 
 def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict[str, float | None]:
@@ -216,16 +232,19 @@ def _apart(mdp: TabularMDP, true: TabularReward, learned: TabularReward) -> dict
     return told
 
 
+BEST = ("best_round", "best_by")
+"""What the algorithm for trajectories tells of its rounds."""
 TRAINED = ("trained_return", "vecnormalize")
 """What `FromFile.trained` says of an expert's training."""
 STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 
-def _table(world: TableWorld) -> dict[str, Any]:
-    mdp, evidence = world.table.mdp, world.table.evidence
+def table_told(table: Tabulation, horizon: int | None) -> dict[str, Any]:
+    """How big a table is, where it is from, and how far off it can be; and the steps that values count."""
+    mdp, evidence = table.mdp, table.evidence
     return {
-        "horizon": world.horizon,
+        "horizon": horizon,
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
         "counted": mdp.visits is not None,
@@ -236,6 +255,15 @@ def _table(world: TableWorld) -> dict[str, Any]:
 def learning_curve(loop: "Loop") -> Curve:
     """What the agent earned under the true reward as it trained."""
     return loop.folder.load("learning_curve.csv", read_curve)
+
+
+def settled(curve: Curve, scale: Scale) -> dict[str, int | None]:
+    """Environment steps after which the score stays good, and nearly all of it; None where it does not, or there is none."""
+    points = np.column_stack([curve.steps, curve.value])
+    return {
+        f"steps_to_{good:g}": None if scale.reason is not None else settled_at(points, scale.random, scale.expert, good)
+        for good in (GOOD, NEARLY_ALL)
+    }
 
 
 def settled_at(curve: np.ndarray, random: float, expert: float, good: float = GOOD) -> int | None:

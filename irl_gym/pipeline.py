@@ -13,6 +13,9 @@ from irl_gym.experiment import Experiment
 from irl_gym.loop import Loop, OnProgress
 from irl_gym.own_files import held
 from irl_gym.reveal import Reveal
+from irl_gym.run_reader import understood
+from irl_gym.runs import read_run
+from irl_gym.worlds import TableWorld
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +76,21 @@ def recover_and_retrain(
         DegenerateExpert: no reward prefers the expert's actions.
         SolverTimeout, SolverFailed: a linear program without an answer.
         RunConflict: the folder holds another run, another process works in it, or a link in it leads out of it.
+        RunIncomplete: the run was finished before, and what it says of itself is not what its files give.
         RunNewer: the folder holds a run of a newer version.
         WriteFailed: the disk became full, or the folder was deleted meanwhile.
     """
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-    return Report(loop.folder.path, loop.folder_metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
+        metrics = _read_again(loop) if stages["report"].get("kept") else loop.folder_metrics
+    return Report(loop.folder.path, metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
+
+
+def _read_again(loop: Loop) -> Mapping[str, Any]:
+    """The metrics of a run that was finished before, which may have been changed since."""
+    with understood(loop.folder.path):
+        return read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None).metrics
 
 
 def _shown(env: gym.Env) -> Mapping[str, int]:

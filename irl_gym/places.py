@@ -1,7 +1,6 @@
 """Where an experiment takes place: a table, exact or of cells; else the environment, which is stepped."""
 
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from irl_gym.errors import (
     InvalidParameter,
     NotDiscrete,
     NotTabular,
-    RunConflict,
 )
 from irl_gym.experiment import Experiment
 from irl_gym.learners.trajectory import TrajectoryLP
@@ -40,7 +38,7 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
     Args:
         asked: the experiment.
         env: its environment.
-        out: folder of the run, where a table may be kept, or an enumeration that was killed.
+        out: folder of the run, which is held (`own_files.held`), where a table may be kept, or an enumeration that was killed.
         tell: told the share of the table that is made.
 
     Raises:
@@ -95,21 +93,4 @@ def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], N
     by = asked.table or Enumeration(known=True)
     if isinstance(by, Enumeration) and by.checkpoint is None:
         by = replace(by, checkpoint=out / UNDER_WAY)
-    with _room(out):
-        return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))
-
-
-@contextlib.contextmanager
-def _room(out: Path) -> Iterator[None]:
-    """The folder, for an enumeration that is under way; gone afterwards if nothing is in it, as where there is no table."""
-    made = [one for one in (out, *out.parents) if not one.exists()]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunConflict(f"{out} cannot be made ({error}): expected a folder of yours. Choose another --out.") from error
-    try:
-        yield
-    finally:
-        for one in made:
-            with contextlib.suppress(OSError):  # something was written
-                one.rmdir()
+    return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))

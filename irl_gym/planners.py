@@ -9,6 +9,7 @@ import copy
 import io
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +22,7 @@ from gymnasium import spaces
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import HumanOutputFormat, Logger, configure
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym._typing import Actions
@@ -228,9 +229,10 @@ class SB3:
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
             if log is not None:
                 model.set_logger(configure(str(log), ["tensorboard"]))
+            elif model.tensorboard_log is None:  # SB3's own logger leaves a folder in the temporary one
+                model.set_logger(Logger(None, [HumanOutputFormat(sys.stdout)] if model.verbose else []))
             model.learn(self.total_timesteps, callback=callback)
-            if log is not None:
-                model.logger.close()
+            model.logger.close()
         if progress:
             progress(model.num_timesteps, agent)
         return agent
@@ -267,8 +269,7 @@ FOR_CONTROL = SB3(
 
 def _batch_size(rollout: int) -> int:
     """Half a rollout or less, about 1024, without a rest; all of it where it has no such divisor."""
-    divisors = [d for d in range(256, min(rollout, 1024) + 1) if rollout % d == 0]
-    return max(divisors, default=rollout)
+    return max((d for d in range(256, min(rollout, 1024) + 1) if rollout % d == 0), default=rollout)
 
 
 class _Report(BaseCallback):

@@ -3,7 +3,7 @@ Axes: S states, A actions, n points of the learning curve, k pieces of the lambd
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from irl_gym.run_reader import RunReader, understood
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
-from irl_gym.verified import recomputed
+from irl_gym.verified import Claim, again, claims, recomputed, with_again
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +76,8 @@ class Run:
     """Is a digest recorded of each file that was read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
     """Is what the metrics say of the expert's loss under the reward computed from these files, not the run's record?"""
+    judged_again: bool = False
+    """And what they say of values, scores, agreement, the worst tie and distances between rewards?"""
 
     @property
     def tabular(self) -> TabularReward | None:
@@ -93,6 +95,17 @@ class Run:
     def caution(self) -> str | None:
         """What is to be said of files that no digests vouch for; None where some do."""
         return None if self.vouched else "Nothing vouches for this run's files: as in earlier versions, no digests are kept."
+
+    @property
+    def whose(self) -> str:
+        """Whose word it is, what is said of the run."""
+        again = ("whether the expert is optimal under the reward",) if self.recomputed else ()
+        if self.judged_again:
+            again += ("values, scores and agreement", "the worst tie", "distances between rewards", "the size of the table")
+        if not again:
+            return "Everything is the run's own record."
+        of = ", and among it the value of its expert's episodes" if self.config.get("dataset") is not None else ""
+        return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{of}."
 
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.
@@ -142,6 +155,9 @@ def _read(path: Path, table: Tabulation | None) -> Run:
     for record in records.values():
         reader.check(record)
     env_id, observations, names = _environment(reader)
+    if config.get("env_id") not in (None, env_id):
+        what = f"{ENVIRONMENT} is of {env_id!r}: expected {config['env_id']!r}, as config.json has"
+        raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
     metrics = reader.read("metrics.json", read_json)
     on_table = metrics.get("table") is not None
     run = Run(
@@ -216,21 +232,35 @@ def _check_shapes(run: Run, reader: RunReader) -> None:
 
 
 def _with_proof(run: Run, reader: RunReader) -> Run:
-    """The run with its reward's proof as its files give it now, where they do.
+    """The run with what metrics.json says of its reward and policies as its files give it now, where they do.
 
     Raises:
         RunIncomplete: they contradict what was recorded.
     """
+    told = claims(run.config, run.stages, run.certificate, run.metrics, run.table)
+    _check_claims(told, run, reader)
     reward = run.tabular
     if run.table is None or reward is None:
         return run
     try:
         found = recomputed(run.path, run.config, run.metrics["reward"], run.table, run.expert, reward)
+        now = again(run.config, run.metrics, run.table, run.expert, run.agent, reward, run.curve)
     except InvalidInput as error:
-        again = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
-        raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {again}") from error
-    told = {**run.metrics["reward"], **(found or {})}
-    return replace(run, metrics={**run.metrics, "reward": told}, recomputed=found is not None)
+        mend = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
+        raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {mend}") from error
+    metrics = run.metrics
+    if now is not None:
+        _check_claims(now[0], run, reader)
+        metrics = with_again(metrics, now[1])
+    metrics = {**metrics, "reward": {**metrics["reward"], **(found or {})}}
+    optimal = found is not None and "expert_optimal" in found
+    return replace(run, metrics=metrics, recomputed=optimal, judged_again=now is not None)
+
+
+def _check_claims(told: Iterable[Claim], run: Run, reader: RunReader) -> None:
+    for one in told:
+        if (fault := one.fault(run.metrics)) is not None:
+            raise reader.incomplete(fault)
 
 
 def _part(path: Path, name: str) -> dict[str, Any] | None:

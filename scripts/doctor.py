@@ -24,6 +24,8 @@ from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
 from irl_gym.terminal import harmless, print_error
 
+WHOSE = "What only the learner knew, as lambda_0 and what its solver said, is the run's own record; all else is computed now."
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -82,6 +84,8 @@ def main(arguments: Arguments) -> int:
     if diagnosis is None:
         return 2
     show(diagnosis, console, run)
+    if run is None or run.table is not None:
+        console.print(Text(f"\n{WHOSE}"))
     if run is not None and run.caution is not None:
         console.print(Text(f"\n{run.caution}"))
     complete = unfinished is None and not without_page(run, console)

@@ -1,5 +1,7 @@
 """Shape annotations are checked while the tests run; hypothesis is seeded and has no clock."""
 
+import shutil
+
 import jaxtyping
 
 jaxtyping.install_import_hook("irl_gym", "typechecker.check")
@@ -21,6 +23,14 @@ def pytest_configure(config):
 
 def pytest_runtest_setup():
     typechecker.begin()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def logs_of_sb3(tmp_path_factory):
+    """Models that tests train by themselves log into pytest's own folders; else SB3 leaves a folder of each in the system's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
+        yield
 
 
 KWARGS = {
@@ -58,3 +68,29 @@ def unchecked():
     jaxtyping.config.update("jaxtyping_disable", True)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory):
+    """The folder of the finished run of `lake_run`, which is copied before it is changed."""
+    from lake_run import COMMAND, asked
+
+    from irl_gym.pipeline import recover_and_retrain
+
+    out = tmp_path_factory.mktemp("runs") / "lake"
+    recover_and_retrain(asked(), out, command=COMMAND)
+    return out
+
+
+@pytest.fixture
+def copied(finished, tmp_path):
+    """A copy of a finished run."""
+    return shutil.copytree(finished, tmp_path / "copy")
+
+
+@pytest.fixture
+def unvouched(copied):
+    """The same without digests, as of an earlier version."""
+    from forgetting import without_digests
+
+    return without_digests(copied)

@@ -119,3 +119,18 @@ def scattered(S: int, successors: int, A: int = 4, gamma: float = 0.99) -> tuple
     rows, columns = np.repeat(np.arange(S * A), successors), rng.integers(S, size=S * A * successors)
     P = sp.csr_array((rng.dirichlet(np.ones(successors), size=S * A).ravel(), (rows, columns)), shape=(S * A, S))
     return TabularMDP(P, gamma, np.full(S, 1 / S)), (P @ rng.normal(size=S)).reshape(S, A)
+
+
+def random_features(seed, S):
+    """(S, K) features of any K from 1 to S + 2, and a sample of at least half of the states."""
+    rng = np.random.default_rng([seed, 1])
+    Phi = rng.normal(size=(S, rng.integers(1, S + 3)))
+    return Phi, np.sort(rng.choice(S, size=rng.integers(S // 2, S + 1), replace=False))
+
+
+def with_features(seed, kind):
+    """A random model of 8 states, features and a sample."""
+    return random_model(seed, S=8, kind=kind), *random_features(seed, 8)
+
+
+featured = st.builds(with_features, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(KINDS))

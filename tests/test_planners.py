@@ -125,6 +125,13 @@ def test_sb3_leaves_torchs_threads_as_they_were(vec):
     assert torch.get_num_threads() == before
 
 
+@pytest.mark.parametrize("verbose", [0, 1])
+def test_sb3_makes_no_folder_of_logs_unasked_and_says_what_it_is_asked_to(vec, tmp_path, monkeypatch, capsys, verbose):
+    monkeypatch.setenv("SB3_LOGDIR", str(tmp_path / "logs"))  # in place of one in the temporary folder
+    SB3(total_timesteps=8, hyperparameters={"verbose": verbose, "n_steps": 8, "n_epochs": 1}).plan(vec, gamma=0.9)
+    assert not any(tmp_path.iterdir()) and ("total_timesteps" in capsys.readouterr().out) == bool(verbose)
+
+
 def test_sb3_trains_on_a_gymnasium_environment_with_its_own_defaults():
     agent = SB3("PPO", 128, {"n_steps": 64}).plan(gym.make("CartPole-v1"), gamma=0.99)
     assert agent.model.policy.net_arch == {"pi": [64, 64], "vf": [64, 64]}

@@ -3,10 +3,9 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecNormalize
-from tiny_env import TableEnv
+from tiny_env import Room, TableEnv
 
 from irl_gym.bases import RadialBasis
 from irl_gym.errors import InvalidFeatures
@@ -74,27 +73,9 @@ def test_rewarded_vec_env_pays_rewards_of_coordinates():
     np.testing.assert_allclose(rewards, reward.of(observations), rtol=1e-6)
 
 
-class Room(gym.Env):
-    """Shows a dictionary, and ends after two steps."""
-
-    observation_space = spaces.Dict(a=spaces.Discrete(9), b=spaces.Box(0, 9, (2,)))
-    action_space = spaces.Discrete(2)
-
-    def reset(self, *, seed=None, options=None):
-        self.t = 0
-        return self._seen(), {}
-
-    def _seen(self):
-        return {"a": self.t, "b": np.full(2, self.t, dtype=np.float32)}
-
-    def step(self, action):
-        self.t += 1
-        return self._seen(), 0.0, self.t == 2, False, {}
-
-
 def test_rewarded_vec_env_pays_rewards_of_dictionaries():
     reward = LinearReward(np.array([1.0]), Functions(lambda seen: seen["b"][:, :1], 1))
-    venv = RewardedVecEnv(make_vec_env(Room, 2), reward)
+    venv = RewardedVecEnv(make_vec_env(lambda: Room(2), 2), reward)
     venv.reset()
     paid = [venv.step(np.zeros(2, dtype=int))[1].tolist() for _ in range(4)]
     assert paid == [[1.0, 1.0], [2.0, 2.0], [1.0, 1.0], [2.0, 2.0]]

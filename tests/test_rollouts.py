@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 from scipy.stats import ks_2samp
-from tiny_env import TableEnv
+from tiny_env import Room, TableEnv
 
 from irl_gym.demonstrations import collect
 from irl_gym.errors import InvalidParameter
@@ -149,22 +149,7 @@ def test_run_episodes_counts_actions_from_0_when_the_space_does_not():
 
 
 def test_run_episodes_stacks_dictionaries():
-    class Room(gym.Env):
-        observation_space = spaces.Dict(a=spaces.Discrete(9), b=spaces.Box(0, 9, (2,)))
-        action_space = spaces.Discrete(2)
-
-        def reset(self, *, seed=None, options=None):
-            self.t = 0
-            return self._seen(), {}
-
-        def _seen(self):
-            return {"a": np.int64(self.t), "b": np.full(2, self.t, dtype=np.float32)}
-
-        def step(self, action):
-            self.t += 1
-            return self._seen(), 0.0, self.t == 3, False, {}
-
-    for episode in run_episodes(Room(), RandomPolicy(2, np.random.default_rng(0)), 2, most=9):
+    for episode in run_episodes(Room(3), RandomPolicy(2, np.random.default_rng(0)), 2, most=9):
         assert episode.observations["a"].tolist() == [0, 1, 2, 3] and episode.observations["b"].shape == (4, 2)
 
 

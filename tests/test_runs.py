@@ -8,48 +8,22 @@ import shutil
 import gymnasium as gym
 import numpy as np
 import pytest
-from forgetting import without_digests
+from lake_run import COMMAND, asked
 
 from irl_gym.claims import write_environment
 from irl_gym.errors import RunConflict, RunIncomplete, RunNewer
-from irl_gym.experiment import Experiment
 from irl_gym.layouts import grid_layout
 from irl_gym.loop import Loop
 from irl_gym.pipeline import recover_and_retrain
-from irl_gym.planners import SB3
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
 
-COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
-LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
-
-
-def asked(**changes):
-    return Experiment("FrozenLake-v1", 0.99, **{"retrain": SB3(total_timesteps=8_192), **LAKE, **changes})
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    out = tmp_path_factory.mktemp("runs") / "lake"
-    recover_and_retrain(asked(), out, command=COMMAND)
-    return out
-
 
 @pytest.fixture(scope="module")
 def run(finished):
     return read_run(finished)
-
-
-@pytest.fixture
-def copied(finished, tmp_path):
-    return shutil.copytree(finished, tmp_path / "copy")
-
-
-@pytest.fixture
-def unvouched(copied):
-    return without_digests(copied)
 
 
 def test_a_run_knows_its_command_as_a_shell_reads_it(run):
@@ -161,7 +135,7 @@ def test_a_curve_with_a_field_that_has_no_end_is_damage(unvouched):
         read_run(unvouched)
 
 
-@pytest.mark.parametrize("change", [{"reward": {"learner": "FiniteLP", "loss_low": "x"}}, {"reward": None}])
+@pytest.mark.parametrize("change", [{"policies": None}, {"reward": None}])
 def test_metrics_that_say_what_no_run_says_are_not_understood(unvouched, change):
     write_json(unvouched / "metrics.json", read_json(unvouched / "metrics.json") | change)
     with pytest.raises(RunIncomplete, match="cannot be understood"):

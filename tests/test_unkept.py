@@ -95,10 +95,10 @@ def test_a_dataset_can_say_where_it_was_recorded_if_that_is_json(kwargs, kept):
 
 def test_a_run_with_an_object_is_continued_with_one_like_it_and_not_with_another(tmp_path):
     run = [Experiment("Plain-v0", 0.9, {"thing": Thing(size)}, **FEW) for size in (3, 3, 4)]
-    Loop(run[0], tmp_path / "run").stage("expert")
-    assert Loop(run[1], tmp_path / "run").stage("expert")["kept"]
+    Loop(run[0], tmp_path).stage("expert")
+    assert Loop(run[1], tmp_path).stage("expert")["kept"]
     with pytest.raises(RunConflict, match=r"env_kwargs\.thing\.sha256"):
-        Loop(run[2], tmp_path / "run")
+        Loop(run[2], tmp_path)
 
 
 @pytest.mark.parametrize(

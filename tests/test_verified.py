@@ -1,49 +1,28 @@
 """What is said of an expert under a reward is computed from the files that lie there; what contradicts them is refused."""
 
-import shutil
+import copy
+from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import pytest
-from forgetting import without_digests
+from forgetting import with_digests_anew
+from lake_run import asked
 
 from irl_gym.errors import RunIncomplete
-from irl_gym.experiment import Experiment
 from irl_gym.linear_reward import load_reward
-from irl_gym.page.proof import verdict
+from irl_gym.page.proof import certificate, verdict
 from irl_gym.pipeline import recover_and_retrain
-from irl_gym.planners import SB3
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run
+from irl_gym.verified import again, claims, recomputed, with_again
 from irl_gym.worlds import load_actions
-
-LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
-
-
-def asked(**changes):
-    return Experiment("FrozenLake-v1", 0.99, **{"retrain": SB3(total_timesteps=8_192), **LAKE, **changes})
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    out = tmp_path_factory.mktemp("runs") / "lake"
-    recover_and_retrain(asked(), out)
-    return out
 
 
 @pytest.fixture(scope="module")
 def run(finished):
     return read_run(finished)
-
-
-@pytest.fixture
-def copied(finished, tmp_path):
-    return shutil.copytree(finished, tmp_path / "copy")
-
-
-@pytest.fixture
-def unvouched(copied):
-    return without_digests(copied)
 
 
 def negated(path):
@@ -81,13 +60,122 @@ def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(unvouched, fi
 
 
 def test_what_is_said_of_the_expert_is_computed_and_not_read(unvouched, run):
-    content = read_json(unvouched / "metrics.json")
-    write_json(unvouched / "metrics.json", content | {"reward": content["reward"] | {"expert_optimal": False}})
+    for name in ("metrics.json", "certificate.json"):
+        edited(unvouched / name, **({"reward.expert_optimal": False} if name == "metrics.json" else {"expert_optimal": False}))
     assert read_run(unvouched).metrics["reward"] == run.metrics["reward"] and run.recomputed
 
 
-def test_a_record_that_cannot_be_computed_again_is_told_as_one(unvouched):
-    content = read_json(unvouched / "metrics.json")
-    write_json(unvouched / "metrics.json", content | {"reward": content["reward"] | {"learner": "Theirs"}})
-    run = read_run(unvouched)
-    assert not run.recomputed and "by the run's own record" in verdict(run)["sentence"]
+def test_a_learner_that_judges_by_episodes_has_the_word_of_the_table_beside_its_own(finished, run):
+    record = {**run.metrics["reward"], "learner": "TrajectoryLP", "expert_optimal": True}
+    found = recomputed(finished, run.config, record, run.table, run.expert, TabularReward(-run.tabular.values))
+    told = replace(run, metrics={**run.metrics, "reward": record | found}, recomputed=False)
+    assert found["on_table"].startswith("no: the best policy earns at least")
+    assert f"by the run's own record, and on the table: {found['on_table']}" in verdict(told)["sentence"]
+    assert ("Judged on the table", found["on_table"]) in certificate(told).shown["lines"]
+
+
+# --- digests that were made anew ---
+
+
+def edited(path, **changes):
+    """A json file in which some entries, by their dotted names, are others."""
+    content = read_json(path)
+    for name, value in changes.items():
+        *where, last = name.split(".")
+        reduce(dict.__getitem__, where, content)[last] = value
+    write_json(path, content)
+
+
+EDITS = {
+    "metrics.json": {
+        "reward.learner": ("Theirs", "config.json"), "demonstrations.given": (True, "config.json"),
+        "reward.status": ("Perfect", r"\.stages/reward\.json"),
+        "demonstrations.episodes": (7, r"\.stages/demonstrations\.json"),
+        "reward.degenerate": (True, r"certificate\.json"), "reward.violated_states": (3, r"certificate\.json"),
+        "table.exact": (False, r"table\.npz"), "table.states": (17, r"table\.npz"), "table.horizon": (3, r"table\.npz"),
+        "policies.random.value": (0.0, r"table\.npz"), "policies.expert.value": (2.0, r"expert\.npz"),
+        "policies.retrained.value": (0.9, r"agent_policy\.npz"),
+    },
+    "certificate.json": {"duality_gap": (0.5, r"certificate\.json"), "zero": (True, r"certificate\.json")},
+    "config.json": {"learner.type": ("FeatureLP", r"config\.json"), "epsilon": (0.1, r"config\.json")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "entry"), [(name, entry) for name, entries in EDITS.items() for entry in entries])
+def test_an_entry_that_other_files_contradict_is_named_with_them(copied, name, entry):
+    value, source = EDITS[name][entry]
+    edited(copied / name, **{entry: value})
+    with pytest.raises(RunIncomplete, match=rf"metrics\.json has \S+ .*: expected .*, as {source} gives it; delete "):
+        read_run(with_digests_anew(copied))
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "value", "gone"),
+    [
+        ("metrics.json", "reward.status", "Perfect", ["metrics.json"]),
+        ("certificate.json", "objective", 7.0, ["certificate.json", "metrics.json"]),
+        ("environment.json", "id", "Theirs-v0", ["environment.json"]),
+    ],
+)
+def test_what_was_edited_is_refused_by_who_reads_and_who_continues_and_the_mend_works(
+    finished, copied, name, entry, value, gone
+):
+    edited(copied / name, **{entry: value})
+    with_digests_anew(copied)
+    for read in (read_run, lambda path: recover_and_retrain(asked(), path)):
+        with pytest.raises(RunIncomplete, match=f"delete {' and '.join(gone)}, and .* again"):
+            read(copied)
+    for one in gone:
+        (copied / one).unlink()
+    recover_and_retrain(asked(), copied)
+    assert read_run(copied).vouched and (copied / name).read_bytes() == (finished / name).read_bytes()
+
+
+def test_an_agent_that_was_swapped_is_named_and_made_again(copied, run):
+    np.savez(copied / "agent_policy.npz", actions=np.where(run.metrics["policies"]["retrained"]["value"], 0, run.expert))
+    with pytest.raises(RunIncomplete, match=r"as agent_policy\.npz gives it; delete agent_policy\.npz and metrics\.json, and"):
+        read_run(with_digests_anew(copied))
+    for name in ("agent_policy.npz", "metrics.json"):
+        (copied / name).unlink()
+    recover_and_retrain(asked(), copied)
+    assert np.array_equal(read_run(copied).agent, run.agent)
+
+
+RECORDED = {
+    f"policies.{name}.{key}"
+    for name in ("expert", "random", "retrained")
+    for key in ("mean_return", "return_low", "return_high", "return_share")
+}
+"""Of metrics.json, what is sampled: the page says that it is the run's own record."""
+
+
+def leaves(content, where=""):
+    """The dotted names of what a json object holds."""
+    for key, value in content.items():
+        yield from leaves(value, f"{where}{key}.") if isinstance(value, dict) else [f"{where}{key}"]
+
+
+def test_each_entry_is_compared_or_computed_or_known_to_be_a_record(finished, run):
+    told = read_json(finished / "metrics.json")
+    parts = run.config, run.stages, run.certificate, told, run.table
+    claimed, now = again(run.config, told, run.table, run.expert, run.agent, run.tabular, run.curve)
+    checked, left = [*claims(*parts), *claimed], set()
+    assert with_again(told, now) == told == {**run.metrics, "reward": told["reward"]}
+    for name in leaves(told):
+        other = copy.deepcopy(told)
+        *where, last = name.split(".") if "steps_to_" not in name else name.split(".", 1)
+        reduce(dict.__getitem__, where, other)[last] = "another"
+        if not any(one.fault(other) for one in checked) and with_again(other, now) != told:
+            left.add(name)
+    assert left == RECORDED
+
+
+def test_a_horizon_without_an_end_leaves_the_values_to_the_record(run):
+    metrics = {**run.metrics, "table": {**run.metrics["table"], "horizon": 10**9}}
+    assert again(run.config, metrics, run.table, run.expert, run.agent, run.tabular, run.curve) is None
+    assert replace(run, recomputed=False, judged_again=False).whose == "Everything is the run's own record."
+
+
+def test_a_page_says_what_was_computed_again_and_that_all_else_is_a_record(finished, run):
+    assert "values, scores and agreement" in run.whose and run.whose.endswith("All else is the run's own record.")
+    assert run.whose.replace("'", "&#39;") in (finished / "report.html").read_text()

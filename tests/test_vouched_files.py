@@ -1,7 +1,6 @@
 """A file of a run that is not the one it left is named when the run is read or continued, with a mend that works."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -26,11 +25,6 @@ ASKED = Experiment("FrozenLake-v1", 0.99, **LAKE)
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     return recover_and_retrain(ASKED, tmp_path_factory.mktemp("vouched") / "run").out
-
-
-@pytest.fixture
-def copied(finished, tmp_path):
-    return shutil.copytree(finished, tmp_path / "run")
 
 
 def negated(path):

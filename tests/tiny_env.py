@@ -1,10 +1,32 @@
 """Environments of a few states that publish a table, and may do something else than it says."""
 
 import gymnasium as gym
+import numpy as np
 from gymnasium import spaces
 
 Line = tuple[float, int, float, bool]
 Table = list[list[list[Line]]]
+
+
+class Room(gym.Env):
+    """Shows a dictionary, and ends after some steps."""
+
+    observation_space = spaces.Dict(a=spaces.Discrete(9), b=spaces.Box(0, 9, (2,)))
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, steps: int):
+        self.steps = steps
+
+    def reset(self, *, seed=None, options=None):
+        self.t = 0
+        return self._seen(), {}
+
+    def _seen(self):
+        return {"a": np.int64(self.t), "b": np.full(2, self.t, dtype=np.float32)}
+
+    def step(self, action):
+        self.t += 1
+        return self._seen(), 0.0, self.t == self.steps, False, {}
 
 
 class TableEnv(gym.Env):

@@ -5,6 +5,7 @@ truncation: its last observations are missing, as in most logs. The copies are r
 each is unfinished and counts as truncated. No attribute is imported from Stable-Baselines3: anything laid out so is read.
 """
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium as gym
@@ -51,8 +52,7 @@ def from_rollouts(
         InvalidDemonstrations: no buffer, an empty one, or rows that cannot be right; the first is named by copy and step.
         NotDiscrete: continuous actions.
     """
-    replay, rollout = hasattr(buffer, "dones"), hasattr(buffer, "episode_starts")
-    if not (replay or rollout) or not hasattr(buffer, "observations"):
+    if not (hasattr(buffer, "dones") or hasattr(buffer, "episode_starts")) or not hasattr(buffer, "observations"):
         raise InvalidDemonstrations(
             f"the buffer is {type(buffer).__name__}: expected a RolloutBuffer or a ReplayBuffer of Stable-Baselines3."
         )
@@ -61,40 +61,72 @@ def from_rollouts(
         if action_space is None and n_actions is None:
             action_space = getattr(buffer, "action_space", None)
     how = reading(space, n_actions, action_space, env, last)
-    order = _order(buffer)
-    if not len(order):
-        raise InvalidDemonstrations("there are no rows: the buffer is empty. Let the algorithm collect some steps first.")
-    rewards, size = as_array(buffer.rewards, "rewards"), int(buffer.buffer_size)
-    if rewards.ndim != 2:
-        raise InvalidDemonstrations(f"the buffer's rewards have shape {rewards.shape}: expected (n_steps, n_envs).")
-    copies = rewards.shape[1]
-    copy, time = np.divmod(np.arange(copies * len(order)), len(order))  # copy after copy, each in the order of time
-
-    def column(raw: Any) -> Any:
-        return by_part(lambda part: _by_time(as_array(part, "buffer's arrays"), size, copies)[order[time], copy], raw)
-
-    def flag(what: str, raw: Any) -> np.ndarray:
-        return truths(column(raw) if is_list(raw) else raw, what, lambda row: f"copy {copy[row]}, step {time[row]} (from 0)")
-
-    flags: dict[str, np.ndarray] = {}
-    if replay:
-        done = flag("dones", buffer.dones)
-        timeouts = flag("timeouts", getattr(buffer, "timeouts", np.zeros(rewards.shape)))
-        flags = {"terminated": done & ~timeouts, "truncated": done & timeouts}
-        starts = np.append(True, done[:-1])
-    else:
-        starts = flag("episode_starts", buffer.episode_starts)
-    starts |= time == 0
+    steps = _Steps.of(buffer)
+    starts, flags = _cut(buffer, steps)
     following = getattr(buffer, "next_observations", None)
     rows = _worth_reading(starts, keep_single=following is not None or last in ("keep", "repeat"))
-    copy, time = copy[rows], time[rows]  # what `column` reads from here on
+    steps = replace(steps, copy=steps.copy[rows], time=steps.time[rows])
     made = Rows(
-        how, np.append(np.flatnonzero(starts[rows]), len(rows)), lambda row: f"copy {copy[row]}, step {time[row]} (from 0)",
-        column(buffer.observations), column(buffer.actions), column(buffer.rewards),
-        next_observations=None if following is None else column(following), **{key: flag[rows] for key, flag in flags.items()},
+        how, np.append(np.flatnonzero(starts[rows]), len(rows)), steps.name,
+        *(steps.column(one) for one in (buffer.observations, buffer.actions, buffer.rewards)),
+        next_observations=None if following is None else steps.column(following),
+        **{key: flag[rows] for key, flag in flags.items()},
     ).cut()  # fmt: skip
     say_dropped(sum(one.ending == "dropped" for one in made), len(made), int(starts.sum()) - len(made))
     return made
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Which steps of a buffer are read: copy after copy, each in the order of time."""
+
+    shape: tuple[int, int]
+    """(n_steps, n_envs) of the buffer."""
+    order: np.ndarray
+    """(T,) the steps that are filled, the oldest first."""
+    copy: np.ndarray
+    """(n,) whose step each row is."""
+    time: np.ndarray
+    """(n,) and which of `order`."""
+
+    @classmethod
+    def of(cls, buffer: Any) -> "_Steps":
+        """All that are filled."""
+        order = _order(buffer)
+        if not len(order):
+            raise InvalidDemonstrations("there are no rows: the buffer is empty. Let the algorithm collect some steps first.")
+        rewards = as_array(buffer.rewards, "rewards")
+        if rewards.ndim != 2:
+            raise InvalidDemonstrations(f"the buffer's rewards have shape {rewards.shape}: expected (n_steps, n_envs).")
+        copies = rewards.shape[1]
+        return cls((int(buffer.buffer_size), copies), order, *np.divmod(np.arange(copies * len(order)), len(order)))
+
+    def name(self, row: int) -> str:
+        """Where a row stands."""
+        return f"copy {self.copy[row]}, step {self.time[row]} (from 0)"
+
+    def column(self, raw: Any) -> Any:
+        """(n, ...) one of the buffer's arrays, or the parts of one."""
+        return by_part(
+            lambda part: _by_time(as_array(part, "buffer's arrays"), *self.shape)[self.order[self.time], self.copy], raw
+        )
+
+    def flag(self, what: str, raw: Any) -> np.ndarray:
+        """(n,) booleans."""
+        return truths(self.column(raw) if is_list(raw) else raw, what, self.name)
+
+
+def _cut(buffer: Any, steps: _Steps) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """(n,) where episodes start, and how those of a replay buffer ended."""
+    flags = {}
+    if hasattr(buffer, "dones"):
+        done = steps.flag("dones", buffer.dones)
+        timeouts = steps.flag("timeouts", getattr(buffer, "timeouts", np.zeros(steps.shape)))
+        flags = {"terminated": done & ~timeouts, "truncated": done & timeouts}
+        starts = np.append(True, done[:-1])
+    else:
+        starts = steps.flag("episode_starts", buffer.episode_starts)
+    return starts | (steps.time == 0), flags
 
 
 def _worth_reading(starts: np.ndarray, keep_single: bool) -> np.ndarray:

@@ -51,8 +51,7 @@ def from_frame(
     """Episodes from a table; the arguments say which column is what, and None that there is none.
 
     The columns of observations are a name, a list of names (the numbers of a vector, or the parts of a Tuple, each a name or a
-    list), or a dictionary of these for a Dict space. A single column may hold lists, or text such as
-    "(13, 10, 0)" or "[1 2 3]".
+    list), or a dictionary of these for a Dict space. A single column may hold lists, or text as "(13, 10, 0)" or "[1 2 3]".
 
         from_frame("log.csv", observation=["x", "y"], reward=None, terminated="done", env=env)
 
@@ -62,15 +61,13 @@ def from_frame(
         step: its rows are sorted by it; it goes up by 1 from any number. None: they are in order.
         observation: what was seen before the action.
         action: whole numbers.
-        reward: 0.0 where there is none, or no column "reward": no learner reads them; a report pays such an expert by the
-            table.
+        reward: 0.0 where there is none, or no column "reward": no learner reads them, and a report pays by the table.
         terminated: true in the last row of an episode that the environment ended. An episode without counts as truncated. Like
             reward and truncated it may be missing where it is not named.
         truncated: true in the last row of an episode that a time limit ended.
         next_observation: like `observation`: what was seen after the action.
-        last: what to do without `next_observation`: "keep" the last action of each episode, whose successor is then not known,
-            "drop" it, "repeat" the last observation, or "row", the last row of each is an observation only, and its action is
-            left empty; see `irl_gym.imports.rows`.
+        last: without `next_observation`, "keep" the last action of each episode, whose successor is then not known, "drop" it,
+            "repeat" the last observation, or "row": each last row is an observation only; see `irl_gym.imports.rows`.
         space: of the observations.
         n_actions: A; the actions count from 0.
         action_space: Discrete; the actions count from its start.
@@ -88,10 +85,18 @@ def from_frame(
         NotDiscrete: continuous actions.
     """
     how = reading(space, n_actions, action_space, env, last)
-    roles = {"episode": episode, "step": step, "action": action, "reward": reward}
-    roles |= {"terminated": terminated, "truncated": truncated}
+    roles = dict(episode=episode, step=step, action=action, reward=reward, terminated=terminated, truncated=truncated)
+    table, offsets = _sorted(source, roles, observation, next_observation)
+    others = {key: table.role(roles[key]) for key in FLAGS} | {"rewards": table.role(reward)}
+    seen = table.gathered(how.space, observation, "observation")
+    following = None if next_observation is None else table.gathered(how.space, next_observation, "next observation")
+    return Rows(how, offsets, table.name, seen, table.columns[action], next_observations=following, **others).episodes()
+
+
+def _sorted(source: Any, roles: dict[str, str | None], observation: Any, next_observation: Any) -> tuple["_Table", np.ndarray]:
+    """The columns that are named, sorted by episode and step, and (N + 1,) where each episode starts."""
     named = {key: value for key, value in roles.items() if value is not None}
-    for key, value in {"action": action, **named}.items():
+    for key, value in {"action": roles["action"], **named}.items():
         if not isinstance(value, str):
             raise InvalidParameter(f"{key} is {value!r}: expected the name of a column.")
     wanted = named | _roles("observation", observation)
@@ -104,12 +109,7 @@ def from_frame(
         raise InvalidDemonstrations("there are no rows: expected at least one step.")
     order, offsets = _order({key: frame[one].to_numpy() for key, one in named.items() if one in frame}, len(frame), name)
     columns = {one: frame[one].to_numpy()[order] for one in wanted.values() if one in frame}
-    table = _Table(columns, lambda row: name(int(order[row])))
-    others = {key: columns.get(named.get(key, "")) for key in FLAGS} | {"rewards": columns.get(reward or "")}
-    if next_observation is not None:
-        others["next_observations"] = table.gathered(how.space, next_observation, "next observation")
-    seen = table.gathered(how.space, observation, "observation")
-    return Rows(how, offsets, table.name, seen, columns[action], **others).episodes()
+    return _Table(columns, lambda row: name(int(order[row]))), offsets
 
 
 def _roles(what: str, names: Any) -> dict[str, str]:
@@ -175,6 +175,10 @@ class _Table:
     """(n,) by name."""
     name: Name
     """Says where a row stands in the source."""
+
+    def role(self, column: str | None) -> np.ndarray | None:
+        """(n,) a column; None where there is none."""
+        return None if column is None else self.columns.get(column)
 
     def gathered(self, space: spaces.Space, names: Any, what: str) -> Any:
         """The columns of observations, in a layout that `members` takes."""

@@ -89,6 +89,8 @@ def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
     kept = [section for section in sections if section is not None]
     facts = [(letter, f"{run_title(run, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
     facts += [(letter, run.caution) for letter, run in named.items() if run.caution is not None]
+    told = {run.whose: [letter for letter, one in named.items() if one.whose == run.whose] for run in named.values()}
+    facts += [(", ".join(letters), whose) for whose, letters in told.items()]
     context = {"title": f"{len(named)} runs side by side", "facts": facts, "sentence": sentence(named, found), "sections": kept}
     return context, {"figures": specs(kept), "slider": None, "episodes": {}}
 
@@ -127,6 +129,8 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
             yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
     whose = "" if run.recomputed else ", as recorded"
     yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
+    if "on_table" in reward:
+        yield "expert optimal under it, judged on the table", reward["on_table"]
     if told["retrained"]["score"] is not None:
         steps = run.metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"

@@ -128,7 +128,8 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool 
     certified = "whether the expert is optimal under it is undecided"
     if optimal is not None:
         certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
-    certified += "" if run.recomputed else ", by the run's own record"
+    on_table = run.metrics["reward"].get("on_table")
+    certified += "" if run.recomputed else ", by the run's own record" + (f", and on the table: {on_table}" if on_table else "")
     return f"{earned}{tie}; {certified}.{_counted(run)}"
 
 
@@ -168,6 +169,8 @@ def _lines(run: Run) -> Iterator[tuple[str, str]]:
     yield "Status of the program", str(reward.get("status", "not recorded in this version"))
     optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
     yield "Expert optimal under the reward", optimal
+    if "on_table" in reward:
+        yield "Judged on the table", reward["on_table"]
     if not (run.metrics.get("table") or {}).get("exact", True):
         yield "Judged on", estimated_table(run.metrics["table"], reward)
     if held.get("degenerate"):

@@ -91,6 +91,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
         told.append(("irl_gym", str(run.version["irl_gym"])))
     if run.caution is not None:
         told.append(("files", run.caution))
+    told.append(("on this page", run.whose))
     return told
 
 

@@ -24,21 +24,6 @@ ALL_DIFFERENT = ("dense", "sparse", "terminal")
 """Kinds without actions of equal successors, where the programs of sections 3 and 4 count the same rows."""
 
 
-def random_features(seed, S):
-    """(S, K) features of any K from 1 to S + 2, and a sample of at least half of the states."""
-    rng = np.random.default_rng([seed, 1])
-    Phi = rng.normal(size=(S, rng.integers(1, S + 3)))
-    return Phi, np.sort(rng.choice(S, size=rng.integers(S // 2, S + 1), replace=False))
-
-
-def drawn(seed, kind):
-    model = models.random_model(seed, S=8, kind=kind)
-    return model, *random_features(seed, 8)
-
-
-samples = st.builds(drawn, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(models.KINDS))
-
-
 # --- oracle: the paper ---
 
 
@@ -47,7 +32,7 @@ samples = st.builds(drawn, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(
 @pytest.mark.parametrize("l1", [0.0, 0.3])
 def test_feature_lp_objective_equals_the_dense_lp(kind, penalty, l1):
     for seed in range(6):
-        model, Phi, S_0 = drawn(seed, kind)
+        model, Phi, S_0 = models.with_features(seed, kind)
         expected, _ = reference.section_4_lp(model.P, 0.9, model.expert, Phi, S_0, penalty=penalty, l1=l1)
         found = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert)
         assert found.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
@@ -82,20 +67,20 @@ def test_feature_lp_objective_is_12_6837_on_the_grid_of_the_paper():
 # --- property: what every result proves ---
 
 
-@given(sample=samples, penalty=st.sampled_from([1.0, 2.0, 50.0]), l1=st.sampled_from([0.0, 0.1, 1.0]))
+@given(sample=models.featured, penalty=st.sampled_from([1.0, 2.0, 50.0]), l1=st.sampled_from([0.0, 0.1, 1.0]))
 def test_feature_lp_duals_close_the_gap(sample, penalty, l1):
     model, Phi, S_0 = sample
     certificate = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert).certificate
     assert -1e-9 <= certificate.duality_gap < 1e-6
 
 
-@given(sample=samples)
+@given(sample=models.featured)
 def test_feature_lp_keeps_the_weights_within_the_box(sample):
     model, Phi, S_0 = sample
     assert np.abs(FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert).reward.alpha).max() <= 1
 
 
-@given(sample=samples)
+@given(sample=models.featured)
 def test_feature_lp_pays_less_for_the_weights_when_l1_is_larger(sample):
     model, Phi, S_0 = sample
     low, high = (FeatureLP(Phi, S_0=S_0, l1=l1).fit(model.mdp, model.expert).certificate for l1 in (0.01, 0.5))
@@ -131,14 +116,14 @@ def test_feature_lp_judges_states_outside_the_sample():
 
 
 def test_feature_lp_reads_arrays_tables_and_functions_alike():
-    model, Phi, S_0 = drawn(2, "dense")
+    model, Phi, S_0 = models.with_features(2, "dense")
     maps = (Phi, Table(Phi), Functions(lambda rows: Phi[rows], Phi.shape[1]))
     found = [FeatureLP(phi, S_0=S_0).fit(model.mdp, model.expert).objective for phi in maps]
     assert found == pytest.approx([found[0]] * 3, abs=1e-12)
 
 
 def test_feature_lp_asks_for_features_of_observations_when_states_are_given():
-    model, Phi, _ = drawn(2, "dense")
+    model, Phi, _ = models.with_features(2, "dense")
     states = StateIndex(spaces.MultiDiscrete([2, 4]))
     of_pairs = Functions(lambda pairs: Phi[4 * pairs[:, 0] + pairs[:, 1]], Phi.shape[1])
     expected = FeatureLP(Phi).fit(model.mdp, model.expert).objective
@@ -224,7 +209,7 @@ def test_feature_lp_stats_name_the_program(result):
 
 
 def test_feature_lp_reaches_the_same_objective_by_generated_kinks(monkeypatch):
-    model, Phi, _ = drawn(2, "sparse")
+    model, Phi, _ = models.with_features(2, "sparse")
     whole = FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective
     monkeypatch.setattr(weights, "SAMPLE", 2)
     assert FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective == pytest.approx(whole, abs=1e-7)

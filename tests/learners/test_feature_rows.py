@@ -4,28 +4,11 @@ import models
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from irl_gym.errors import DegenerateExpert, InvalidPolicy
 from irl_gym.features import OneHot
 from irl_gym.learners import feature_rows
 from irl_gym.learners.feature import FeatureLP
-
-
-def random_features(seed, S):
-    """(S, K) features of any K from 1 to S + 2, and a sample of at least half of the states."""
-    rng = np.random.default_rng([seed, 1])
-    Phi = rng.normal(size=(S, rng.integers(1, S + 3)))
-    return Phi, np.sort(rng.choice(S, size=rng.integers(S // 2, S + 1), replace=False))
-
-
-def drawn(seed, kind):
-    model = models.random_model(seed, S=8, kind=kind)
-    return model, *random_features(seed, 8)
-
-
-samples = st.builds(drawn, seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(models.KINDS))
-
 
 # --- the sample ---
 
@@ -77,7 +60,7 @@ def test_feature_lp_counts_a_state_once_when_it_is_given_twice():
 # --- the rows ---
 
 
-@given(sample=samples)
+@given(sample=models.featured)
 def test_feature_lp_counts_the_rank_of_the_rows(sample):
     model, Phi, S_0 = sample
     mixed = np.hstack([Phi, Phi @ np.ones((Phi.shape[1], 2))])  # two columns that add nothing
@@ -88,7 +71,7 @@ def test_feature_lp_counts_the_rank_of_the_rows(sample):
     assert (certificate.rank, certificate.n_features) == (np.linalg.matrix_rank(d, tol=1e-9), mixed.shape[1])
 
 
-@given(sample=samples)
+@given(sample=models.featured)
 def test_feature_lp_counts_states_with_and_without_a_row(sample):
     model, Phi, S_0 = sample
     P_pi = model.P[np.arange(8), model.expert]
@@ -99,7 +82,7 @@ def test_feature_lp_counts_states_with_and_without_a_row(sample):
 
 @pytest.mark.parametrize("block", [1, 8, 24])
 def test_rows_do_not_depend_on_the_blocks_of_columns(monkeypatch, block):
-    model, Phi, S_0 = drawn(2, "sparse")
+    model, Phi, S_0 = models.with_features(2, "sparse")
     whole = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)
     monkeypatch.setattr(feature_rows, "BLOCK", block)
     parts = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert)

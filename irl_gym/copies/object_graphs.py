@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory
 from irl_gym.errors import NotTabular
 
 Twin = Callable[[Any], Any | None]
@@ -91,14 +92,25 @@ class References:
         self._numbers: dict[int, int] = {}
         self._twin, self._kinds = twin, kinds
         self._plain: set[type] = set()
+        self._holding: dict[type, bool] = {}
+        self.memories: list[Any] = []
+        """What held memory in the last value that was pickled, arrays above all; but for what is referred to."""
 
         self._pickler = type("Pickler", (pickle.Pickler,), {"persistent_id": staticmethod(self._lookup())})
+        self._sharing = type("Sharing", (self._pickler,), {"reducer_override": lambda pickler, one: pickler.reduced(one)})
         self._unpickler = type("Unpickler", (pickle.Unpickler,), {"persistent_load": self.objects.__getitem__})
 
     def dumps(self, value: Any) -> bytes:
         """The pickle of a value. Raises what its objects raise, and NotTabular for a generator not referred to."""
+        self.memories.clear()
         buffer = io.BytesIO()
         self._pickler(buffer, 5).dump(value)
+        found = blocks(self.memories) if len(self.memories) > 1 else []
+        if found:
+            buffer = io.BytesIO()
+            pickler = self._sharing(buffer, 5)
+            pickler.reduced = Sharing(found)
+            pickler.dump(value)
         return buffer.getvalue()
 
     def loads(self, data: bytes) -> Any:
@@ -110,6 +122,10 @@ class References:
         self._numbers[id(one)] = len(self.objects)
         self.objects.append(one)
         return len(self.objects) - 1
+
+    def knows(self, one: Any) -> bool:
+        """Do pickles refer to an object?"""
+        return id(one) in self._numbers
 
     def refer_inside(self, value: Any) -> None:
         """Number a value and every object inside it that could be changed or told apart."""
@@ -164,7 +180,12 @@ class References:
             return self.refer(one)
         if self._twin(one) is not None:
             raise anew(one)
-        self._plain.add(kind)
+        if kind not in self._holding:
+            self._holding[kind] = holds_memory(kind)
+        if self._holding[kind]:
+            self.memories.append(one)
+        else:
+            self._plain.add(kind)
         return None
 
 

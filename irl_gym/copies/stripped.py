@@ -17,6 +17,7 @@ import numpy as np
 from gymnasium.wrappers import TimeLimit
 
 from irl_gym.copies.object_graphs import ATOMS, CODE, Twin, attributes, children
+from irl_gym.copies.shared_memory import copied
 from irl_gym.errors import NotCopied
 from irl_gym.watching import only_watches
 from irl_gym.wrappers import LearnedReward
@@ -70,8 +71,12 @@ def looked_through(layer: gym.Env) -> bool:
 
 
 def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
-    """Copies of the kept layers, the innermost first: what points to a layer left out points to the next one inside."""
-    memo: dict[int, Any] = {}
+    """Copies of the kept layers, with arrays that share memory where the originals do."""
+    return copied(lambda memo: _layers_copied(kept, chain, memo), {})[0]
+
+
+def _layers_copied(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
+    """The innermost first: what points to a layer left out points to the next one inside."""
     current: gym.Env = chain[-1]
     for layer in reversed(chain):
         if not any(layer is one for one in kept):

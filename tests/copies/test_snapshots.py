@@ -9,23 +9,10 @@ import minigrid  # noqa: F401  (registers its environments)
 import numpy as np
 import pytest
 from minigrid.wrappers import FullyObsWrapper, ImgObsWrapper
-from walk_env import Bag, StandIn, Walk, frames, snapshots_of
+from walk_env import Bag, StandIn, Stubborn, Walk, frames, snapshots_of
 
 if gym_classics._backend is None:  # a second call warns
     gym_classics.register("gymnasium")
-
-
-class Stubborn:
-    """Cannot be pickled, but copied."""
-
-    def __init__(self, n=0):
-        self.n = n
-
-    def __reduce_ex__(self, protocol):
-        raise TypeError("no pickle of me")
-
-    def __deepcopy__(self, memo):
-        return Stubborn(self.n)
 
 
 ENVS = {

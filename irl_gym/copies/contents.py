@@ -1,0 +1,96 @@
+"""Does an object still hold what it held? Asked after every step, so it has to be fast.
+
+A pickle would answer, and takes long. Here every object inside that can be changed is looked at beside a list of what it held:
+where nothing was put in the place of anything, the elements are the same objects, which Python sees by their addresses. What
+else is found is a change for whoever asks to look into: the new part may have the same contents.
+"""
+
+import array
+import copyreg
+import enum
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from irl_gym.copies.object_graphs import ATOMS, CODE, References, attributes, children, slots
+
+Look = Callable[[Any], Any]
+_LEAVES = (*CODE, np.generic, np.dtype, enum.Enum, range)
+
+
+class Contents:
+    """What a value held.
+
+    Args:
+        value: any object.
+        references: have pickled it, and know what it refers to and does not hold.
+    """
+
+    def __init__(self, value: Any, references: References):
+        objects = _objects(value, references)
+        self._held = [(look, one, look(one)) for one in objects for look in _looks(one, references)]
+
+    def unchanged(self) -> bool:
+        """Does it hold the same now? False also where that cannot be compared."""
+        try:
+            return all([look(one) == held for look, one, held in self._held])
+        except Exception:  # whatever a comparison of somebody else's objects raises
+            return False
+
+
+def _objects(value: Any, references: References) -> Iterator[Any]:
+    """A value and every object inside it."""
+    waiting, seen = [value], {id(value)}
+    while waiting:
+        one = waiting.pop()
+        yield one
+        for part in children(one):
+            if not (type(part) in ATOMS or isinstance(part, _LEAVES) or id(part) in seen or references.knows(part)):
+                seen.add(id(part))
+                waiting.append(part)
+
+
+def _looks(one: Any, references: References) -> Iterator[Look]:
+    """How an object's own contents are read, without what is inside its parts."""
+    kind = type(one)
+    if isinstance(one, np.ndarray):
+        yield from (_form, _elements if one.dtype == object else np.ndarray.tobytes)
+    elif isinstance(one, bytearray | array.array):
+        yield bytes
+    elif isinstance(one, dict):
+        yield from (list, _values)
+    elif isinstance(one, list | deque):
+        yield list
+    elif isinstance(one, set):
+        yield set
+    elif not isinstance(one, tuple | frozenset) and not _plain(kind):
+        yield references.dumps
+        return
+    if slots(kind):
+        yield attributes
+    elif hasattr(one, "__dict__"):
+        yield _own
+
+
+def _plain(kind: type) -> bool:
+    """Are its attributes all that an object of this class is made of?"""
+    own = any(getattr(kind, name) is not getattr(object, name) for name in ("__reduce_ex__", "__reduce__", "__getstate__"))
+    return not own and kind not in copyreg.dispatch_table
+
+
+def _form(one: np.ndarray) -> tuple[Any, ...]:
+    return one.shape, one.strides, one.dtype
+
+
+def _elements(one: np.ndarray) -> list[Any]:
+    return [*one.flat]
+
+
+def _values(one: dict[Any, Any]) -> list[Any]:
+    return [*one.values()]
+
+
+def _own(one: Any) -> dict[str, Any]:
+    return {**one.__dict__}

@@ -15,9 +15,11 @@ import gymnasium as gym
 from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.contents import Contents
 from irl_gym.copies.layer_state import LayerState
-from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, References, Steps, anew, attributes, reached
+from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, Steps, attributes, reached
+from irl_gym.copies.references import References, anew
+from irl_gym.copies.replacing import replace_generators
 from irl_gym.copies.shared_memory import Extent, extent
-from irl_gym.copies.stripped import GENERATORS, layers, replace_generators
+from irl_gym.copies.stripped import GENERATORS, layers
 from irl_gym.errors import NotEnumerable, NotTabular
 
 LARGE = 1024

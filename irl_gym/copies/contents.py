@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.copies.object_graphs import ATOMS, CODE, References, attributes, children, slots
+from irl_gym.copies.object_graphs import ATOMS, CODE, attributes, children, slots
+from irl_gym.copies.references import References
 
 Look = Callable[[Any], Any]
 _LEAVES = (*CODE, np.generic, np.dtype, enum.Enum, range)

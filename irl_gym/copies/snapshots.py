@@ -27,15 +27,15 @@ from irl_gym.copies.object_graphs import (
     REFUSALS,
     Difference,
     Pairs,
-    References,
     Twin,
     attributes,
     put,
     reached,
-    twins,
 )
+from irl_gym.copies.references import References, twins
+from irl_gym.copies.replacing import replace_generators
 from irl_gym.copies.shared_memory import copied, extent, overlap
-from irl_gym.copies.stripped import awaken_generators, duplicate, layers, replace_generators
+from irl_gym.copies.stripped import awaken_generators, duplicate, layers
 from irl_gym.errors import InvalidParameter, NotCopied, NotEnumerable, NotTabular
 
 

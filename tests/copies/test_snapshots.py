@@ -233,3 +233,12 @@ def test_snapshot_holds_slots():
     assert (env.count, env._Slotted__hidden) == (1, 1)
     snapshots.restore(empty)
     assert not hasattr(env, "count")
+
+
+def test_restore_gives_methods_back_that_were_put_in_each_others_place():
+    env, snapshots = snapshots_of(Walk())
+    env.reset, env.step = env.step, env.reset
+    state = snapshots.take()
+    env.reset, env.step = env.step, env.reset
+    snapshots.restore(state)
+    assert (env.reset.__func__, env.step.__func__) == (Walk.step, Walk.reset)

@@ -15,11 +15,11 @@ import gymnasium as gym
 from irl_gym.copies.calls import called, seeded_globals, stepped
 from irl_gym.copies.contents import Contents
 from irl_gym.copies.layer_state import LayerState
-from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, Steps, attributes, reached
+from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, GENERATORS, REFUSALS, Steps, attributes, reached
 from irl_gym.copies.references import References, anew
 from irl_gym.copies.replacing import replace_generators
 from irl_gym.copies.shared_memory import Extent, extent
-from irl_gym.copies.stripped import GENERATORS, layers
+from irl_gym.copies.stripped import layers
 from irl_gym.errors import NotEnumerable, NotTabular
 
 LARGE = 1024
@@ -93,6 +93,21 @@ class Constant:
     def of(self, names: frozenset[str]) -> bool:
         """Is it named here, or part of what is?"""
         return any(self.home.name == name or self.home.name.startswith((f"{name}[", f"{name}.")) for name in names)
+
+
+class Held:
+    """What a function, a class or a module holds, and no state does: it has to stay as it is."""
+
+    def __init__(self, what: str, value: Any, references: References):
+        self._what, self._contents = what, Contents(value, references)
+
+    def check(self) -> None:
+        """Raises NotTabular: it has changed."""
+        if not self._contents.unchanged():
+            raise NotTabular(
+                f"a step or reset changes {self._what}, which all copies share: expected all that changes in attributes. Keep "
+                "it in one that __init__ or reset makes; make a function that needs it a method that uses `self`."
+            )
 
 
 def unchanging(rehearsal: gym.Env) -> list[Home]:

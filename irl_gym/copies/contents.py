@@ -8,17 +8,20 @@ else is found is a change for whoever asks to look into: the new part may have t
 import array
 import copyreg
 import enum
+import types
 from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.object_graphs import ATOMS, CODE, attributes, children, slots
+from irl_gym.copies.object_graphs import ATOMS, attributes, children, slots
 from irl_gym.copies.references import References
+from irl_gym.copies.replacing import held_by
 
 Look = Callable[[Any], Any]
-_LEAVES = (*CODE, np.generic, np.dtype, enum.Enum, range)
+_LEAVES = (gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
 
 
 class Contents:
@@ -47,7 +50,7 @@ def _objects(value: Any, references: References) -> Iterator[Any]:
     while waiting:
         one = waiting.pop()
         yield one
-        for part in children(one):
+        for part in (*children(one), *held_by(one)):
             if not (type(part) in ATOMS or isinstance(part, _LEAVES) or id(part) in seen or references.knows(part)):
                 seen.add(id(part))
                 waiting.append(part)
@@ -56,6 +59,9 @@ def _objects(value: Any, references: References) -> Iterator[Any]:
 def _looks(one: Any, references: References) -> Iterator[Look]:
     """How an object's own contents are read, without what is inside its parts."""
     kind = type(one)
+    if isinstance(one, types.FunctionType):
+        yield _held
+        return
     if isinstance(one, np.ndarray):
         yield from (_form, _elements if one.dtype == object else np.ndarray.tobytes)
     elif isinstance(one, bytearray | array.array):
@@ -79,6 +85,10 @@ def _plain(kind: type) -> bool:
     """Are its attributes all that an object of this class is made of?"""
     own = any(getattr(kind, name) is not getattr(object, name) for name in ("__reduce_ex__", "__reduce__", "__getstate__"))
     return not own and kind not in copyreg.dispatch_table
+
+
+def _held(one: types.FunctionType) -> list[Any]:
+    return [*held_by(one)]
 
 
 def _form(one: np.ndarray) -> tuple[Any, ...]:

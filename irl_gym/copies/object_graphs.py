@@ -8,6 +8,7 @@ import copy
 import enum
 import functools
 import pickle
+import random
 import types
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -24,6 +25,7 @@ SHARED = frozenset({"spec", "metadata", "_metadata", "_cached_spec", "_saved_kwa
 """Attributes of a layer that describe it and never change: neither copied nor part of a state."""
 CODE = (type, types.FunctionType, types.ModuleType, np.ufunc)
 """Code is no state: functions, classes and modules are shared, as copy.deepcopy shares them."""
+GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)
 REFUSALS = (TypeError, ValueError, AttributeError, RuntimeError, pickle.PicklingError, copy.Error)
 """What an object raises that will not be copied, pickled or compared. Anything else on that way is a bug of its class."""
 SEQUENCES = (list, tuple, deque)

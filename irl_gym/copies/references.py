@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.copies.object_graphs import ATOMS, Twin, children
+from irl_gym.copies.replacing import changeable, held_by
 from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory
 from irl_gym.errors import NotTabular
 
@@ -48,6 +49,9 @@ class References:
 
         methods = {**copyreg.dispatch_table, types.MethodType: lambda one: (types.MethodType, (one.__func__, one.__self__))}
         own = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
+        self.functions: list[types.FunctionType] = []
+        """Functions that were met and that hold objects, none of which is in a pickle."""
+
         self._pickler = type("Pickler", (pickle.Pickler,), own)
         self._sharing = type("Sharing", (self._pickler,), {"reducer_override": lambda pickler, one: pickler.reduced(one)})
         self._unpickler = type("Unpickler", (pickle.Unpickler,), {"persistent_load": self.objects.__getitem__})
@@ -88,7 +92,7 @@ class References:
                 continue
             if one is value or (type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic)):
                 self.refer(one)
-            for part in children(one):
+            for part in (*children(one), *held_by(one)):
                 if type(part) not in ATOMS and id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
@@ -128,6 +132,10 @@ class References:
     def _first_met(self, one: Any, kind: type) -> int | None:
         if isinstance(one, types.BuiltinFunctionType):
             return self.refer(one) if isinstance(one.__self__, types.ModuleType | None) else None
+        if isinstance(one, types.FunctionType):
+            if changeable(one, self.knows):
+                self.functions.append(one)
+            return self.refer(one)
         if isinstance(one, self._kinds) or kind is object or (isinstance(one, np.dtype) and one.isbuiltin):
             return self.refer(one)
         if self._twin(one) is not None:

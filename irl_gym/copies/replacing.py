@@ -6,8 +6,9 @@ closes over a layer, or has one as default, is made anew over the layer's copy.
 
 import types
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dis import get_instructions
 from typing import Any
 
 import gymnasium as gym
@@ -128,6 +129,23 @@ def held_by(code: Any) -> Iterator[Any]:
             with suppress(ValueError):  # not assigned yet
                 yield cell.cell_contents
         yield from (*(code.__defaults__ or ()), *(code.__kwdefaults__ or {}).values(), *code.__dict__.values())
+
+
+def changeable(function: types.FunctionType, known: Callable[[Any], bool]) -> bool:
+    """Does a function hold what may change: variables that it sets, or objects that are neither code nor known?"""
+    waiting, seen = [function], {id(function)}
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, types.FunctionType) and any(step.opname == "STORE_DEREF" for step in get_instructions(one.__code__)):
+            return True
+        for part in held_by(one):
+            if isinstance(part, types.FunctionType | types.MethodType):
+                if id(part) not in seen:
+                    seen.add(id(part))
+                    waiting.append(part)
+            elif not (type(part) in ATOMS or isinstance(part, CODE) or known(part)):
+                return True
+    return False
 
 
 class _Renewing(_Replacing):

@@ -151,17 +151,14 @@ def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T
     return made, met
 
 
-def all_copied(memo: Any) -> Iterator[Any]:
-    """All that was copied with a memo: `copy.deepcopy` keeps it alive there."""
+def _met(memo: Any) -> Iterator[Any]:
+    """What holds memory among all that was copied with a memo: `copy.deepcopy` keeps it alive there."""
     alive = memo.get(id(memo))
     for one in alive if isinstance(alive, list) else ():
         if type(one) is dict:
-            yield from all_copied(one)  # the memo of a layer
-        yield one
-
-
-def _met(memo: Any) -> Iterator[Any]:
-    return (one for one in all_copied(memo) if holds_memory(type(one)))
+            yield from _met(one)  # the memo of a layer
+        elif holds_memory(type(one)):
+            yield one
 
 
 class Sharing:

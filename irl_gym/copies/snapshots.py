@@ -7,8 +7,8 @@ large parts (a published table, a map) that a walk of random steps left alone. T
 step since one may change back what another changed, notices one with something else in its place or inside. The bytes never
 leave the process.
 
-Not seen: state in class attributes and modules. An object that says itself how it is pickled (`__getstate__`, `__reduce__`) is
-restored as it says.
+What functions close over, and classes and modules share with attributes, is in no state either, and refused when it changes.
+Not seen: other state in class attributes and modules. An object that says itself how it is pickled is restored as it says.
 """
 
 import copy
@@ -18,8 +18,9 @@ from typing import Any
 
 import gymnasium as gym
 
+from irl_gym.copies.apart import held_outside
 from irl_gym.copies.calls import called
-from irl_gym.copies.constants import Constant, Home, found_in, unchanging
+from irl_gym.copies.constants import Constant, Held, Home, found_in, unchanging
 from irl_gym.copies.layer_state import LayerState
 from irl_gym.copies.object_graphs import (
     ABSENT,
@@ -33,7 +34,7 @@ from irl_gym.copies.object_graphs import (
     reached,
 )
 from irl_gym.copies.references import References, twins
-from irl_gym.copies.replacing import replace_generators
+from irl_gym.copies.replacing import held_by, replace_generators
 from irl_gym.copies.shared_memory import copied, extent, overlap
 from irl_gym.copies.stripped import awaken_generators, duplicate, layers
 from irl_gym.errors import InvalidParameter, NotCopied, NotEnumerable, NotTabular
@@ -76,6 +77,7 @@ class Snapshots:
         self._refer_to_parts(self._references)
         self._constants = [*found_in(self._places, homes, self._guard)]
         self._constants += self._uncopied()
+        self._held_outside: dict[int, Held] = {}
         self._begin()
 
     def take(self) -> Any:
@@ -92,6 +94,8 @@ class Snapshots:
                 again |= self._again(one, now)
         with self._references.standing_for(again):
             state, memories = self._taken()
+            if self._hold():
+                state, memories = self._taken()
         for memory in map(extent, memories):
             for one in self._constants:
                 if any(overlap(memory, other) for other in one.extents):
@@ -103,10 +107,23 @@ class Snapshots:
 
         Raises:
             ConstantChanged: one does not: `include` it, and start again.
+            NotTabular: what a function, a class or a module holds does not.
         """
         for one in self._constants:
             if not one.unchanged():
                 raise ConstantChanged(one.home.name)
+        for one in self._held_outside.values():
+            one.check()
+
+    def _hold(self) -> bool:
+        """Refer to what functions hold that were met for the first time: no state holds it. Were there any?"""
+        found, self._references.functions = self._references.functions, []
+        for function in found:
+            names = ", ".join(function.__code__.co_freevars) or "its defaults"
+            what = f"what the function {function.__qualname__} holds ({names})"
+            self._held_outside[id(function)] = Held(what, function, self._guard)
+            self._references.refer_inside([*held_by(function)])
+        return bool(found)
 
     def _again(self, one: Constant, now: Any) -> dict[int, Any]:
         """What a constant that was built anew with the same contents stands for, part by part."""
@@ -178,6 +195,9 @@ class Snapshots:
         self._refer_to_parts(self._references)
         for constant in self._constants:
             self._references.refer_inside(constant.value)
+        for name, value in held_outside(self._layers):
+            self._held_outside[id(value)] = Held(name, value, self._guard)
+            self._references.refer_inside(value)
 
     def _refer_to_parts(self, references: References) -> None:
         for one in [*self._layers, *self._stand_ins]:

@@ -7,22 +7,18 @@ so that an attribute that cannot be copied is named.
 """
 
 import copy
-import random
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 from gymnasium.wrappers import TimeLimit
 
-from irl_gym.copies.apart import check_apart
+from irl_gym.copies.apart import check_apart, held_outside, inside
 from irl_gym.copies.object_graphs import SHARED, attributes, children
 from irl_gym.copies.replacing import renew_functions
-from irl_gym.copies.shared_memory import all_copied, copied
+from irl_gym.copies.shared_memory import copied
 from irl_gym.errors import NotCopied
 from irl_gym.watching import only_watches
 from irl_gym.wrappers import LearnedReward
-
-GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)
 
 
 def layers(env: gym.Env) -> list[gym.Env]:
@@ -74,10 +70,11 @@ def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
 
 
 def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
+    memo |= {id(one): one for _, value in held_outside(kept) for one in inside(value)}
     made = _layers_copied(kept, chain, memo)
     if made.unwrapped is not chain[-1]:  # else it speaks for itself
         cells = renew_functions(made, {id(layer): memo[id(layer)] for layer in chain})
-        check_apart(layers(made), [*chain, *all_copied(memo), *cells])
+        check_apart(layers(made), kept, memo, cells)
     return made
 
 

@@ -16,12 +16,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.object_graphs import ATOMS, attributes, children, slots
+from irl_gym.copies.object_graphs import ATOMS, GENERATORS, attributes, children, slots
 from irl_gym.copies.references import References
 from irl_gym.copies.replacing import held_by
 
 Look = Callable[[Any], Any]
-_LEAVES = (gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
+_LEAVES = (*GENERATORS, gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
+_CONTAINERS = (np.ndarray, bytearray, array.array, dict, list, deque, set, tuple, frozenset, types.FunctionType)
 
 
 class Contents:
@@ -50,7 +51,7 @@ def _objects(value: Any, references: References) -> Iterator[Any]:
     while waiting:
         one = waiting.pop()
         yield one
-        for part in (*children(one), *held_by(one)):
+        for part in () if _opaque(one) else (*children(one), *held_by(one)):
             if not (type(part) in ATOMS or isinstance(part, _LEAVES) or id(part) in seen or references.knows(part)):
                 seen.add(id(part))
                 waiting.append(part)
@@ -72,7 +73,7 @@ def _looks(one: Any, references: References) -> Iterator[Look]:
         yield list
     elif isinstance(one, set):
         yield set
-    elif not isinstance(one, tuple | frozenset) and not _plain(kind):
+    elif _opaque(one):
         yield references.dumps
         return
     if slots(kind):
@@ -81,10 +82,13 @@ def _looks(one: Any, references: References) -> Iterator[Look]:
         yield _own
 
 
-def _plain(kind: type) -> bool:
-    """Are its attributes all that an object of this class is made of?"""
+def _opaque(one: Any) -> bool:
+    """Is it an object that says itself how it is pickled, so that its attributes need not be all that it holds?"""
+    if isinstance(one, _CONTAINERS):
+        return False
+    kind = type(one)
     own = any(getattr(kind, name) is not getattr(object, name) for name in ("__reduce_ex__", "__reduce__", "__getstate__"))
-    return not own and kind not in copyreg.dispatch_table
+    return own or kind in copyreg.dispatch_table
 
 
 def _held(one: types.FunctionType) -> list[Any]:

@@ -4,6 +4,7 @@ A deep copy takes functions as they are: `self.moves = {0: lambda: self.go(0)}` 
 closes over a layer, or has one as default, is made anew over the layer's copy.
 """
 
+import sys
 import types
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -14,7 +15,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.object_graphs import ATOMS, CODE, SHARED, Twin, attributes
+from irl_gym.copies.object_graphs import ATOMS, CODE, GENERATORS, SHARED, Twin, attributes
 
 
 def replace_generators(env: gym.Env, twin: Twin) -> list[Any]:
@@ -124,7 +125,7 @@ def held_by(code: Any) -> Iterator[Any]:
     """What a function closes over, its defaults and what is set on it; or what a method is bound to, and of which function."""
     if isinstance(code, types.MethodType):
         yield from (code.__self__, code.__func__)
-    elif isinstance(code, types.FunctionType):
+    elif isinstance(code, types.FunctionType) and not _of_a_module(code):
         for cell in code.__closure__ or ():
             with suppress(ValueError):  # not assigned yet
                 yield cell.cell_contents
@@ -136,16 +137,28 @@ def changeable(function: types.FunctionType, known: Callable[[Any], bool]) -> bo
     waiting, seen = [function], {id(function)}
     while waiting:
         one = waiting.pop()
-        if isinstance(one, types.FunctionType) and any(step.opname == "STORE_DEREF" for step in get_instructions(one.__code__)):
+        if (
+            isinstance(one, types.FunctionType)
+            and not _of_a_module(one)
+            and any(step.opname == "STORE_DEREF" for step in get_instructions(one.__code__))
+        ):
             return True
         for part in held_by(one):
             if isinstance(part, types.FunctionType | types.MethodType):
                 if id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
-            elif not (type(part) in ATOMS or isinstance(part, CODE) or known(part)):
+            elif not (type(part) in ATOMS or isinstance(part, (*CODE, *GENERATORS)) or known(part)):
                 return True
     return False
+
+
+def _of_a_module(function: types.FunctionType) -> bool:
+    """Is it found by its name? Then it is code, whatever a decorator keeps in it."""
+    found: Any = sys.modules.get(function.__module__)
+    for name in function.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found is function
 
 
 class _Renewing(_Replacing):

@@ -66,7 +66,12 @@ def looked_through(layer: gym.Env) -> bool:
 
 def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
     """Copies of the kept layers, with arrays that share memory where the originals do."""
-    return copied(lambda memo: _apart(kept, chain, memo), {})[0]
+    try:
+        return copied(lambda memo: _apart(kept, chain, memo), {})[0]
+    except NotCopied:
+        if not settable(chain[-1]):
+            raise
+        return copied(lambda memo: _apart(kept, chain, memo), {id(chain[-1]): chain[-1]})[0]
 
 
 def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
@@ -84,13 +89,8 @@ def _layers_copied(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, An
     for layer in reversed(chain):
         if not any(layer is one for one in kept):
             memo[id(layer)] = current
-            continue
-        try:
+        elif id(layer) not in memo:  # else it is used as it is
             current = _copied_layer(layer, memo)
-        except NotCopied:
-            if layer is not chain[-1] or not settable(layer):
-                raise
-            memo[id(layer)] = current = layer
     return current
 
 

@@ -1,5 +1,6 @@
 """What deepcopy leaves as it is leads a copy of an environment back to it: made anew, or refused."""
 
+import logging
 import types
 import weakref
 
@@ -13,6 +14,7 @@ from irl_gym.enumeration.table import Enumeration
 from irl_gym.errors import NotTabular
 
 N = 5
+LOG = logging.getLogger("a line of five cells")
 
 
 class Line(gym.Env):
@@ -26,6 +28,7 @@ class Line(gym.Env):
         give(self)
 
     def put(self, place):
+        LOG.debug("put")
         self.at = place
 
     def see(self):
@@ -61,6 +64,10 @@ def functions_of_functions(env):
 def reads_a_list_that_stays(env):
     places = list(range(N))
     env.see = lambda: places[env.at]
+
+
+def logs(env):
+    env.log = LOG
 
 
 def a_method_behind_a_function(env):
@@ -140,7 +147,7 @@ def of_the_class(env):
 
 
 @pytest.mark.parametrize(
-    "give", [closes_over_self, default, functions_of_functions, a_method_behind_a_function, reads_a_list_that_stays]
+    "give", [closes_over_self, default, functions_of_functions, a_method_behind_a_function, reads_a_list_that_stays, logs]
 )
 def test_a_function_that_holds_the_environment_holds_its_copy_in_a_copy(give):
     env = Line(give)
@@ -168,6 +175,19 @@ def test_what_copies_share_is_refused_where_it_changes(name):
     BOARD[0] = WithBoard.board[0] = 0
     with pytest.raises(NotTabular, match=what):
         Enumeration().table(kind(give), 0.9)
+
+
+class Told(Line):
+    def get_state(self):
+        return self.see()
+
+    def set_state(self, state):
+        self.put(state)
+
+
+def test_get_state_and_set_state_mend_what_leads_back():
+    table = Enumeration().table(Told(closes_over_a_list), 0.9)
+    assert (table.mdp.n_states, table.evidence.exact) == (N, True)
 
 
 def test_a_global_that_stays_is_shared_and_no_obstacle():

@@ -90,6 +90,21 @@ def test_what_else_shares_memory_is_refused(name):
         Enumeration().table(REFUSED[name](), 0.9)
 
 
+class Told(Line):
+    def get_state(self):
+        return int(self.read(self.held))
+
+    def set_state(self, state):
+        self.write(self.held, state)
+
+
+def test_get_state_and_set_state_mend_what_is_refused():
+    buffer = bytearray(4)
+    env = Told([buffer, np.frombuffer(buffer, np.uint8)], put(0, 0), lambda held: held[1][0])
+    table = Enumeration().table(env, 0.9)
+    assert (table.mdp.n_states, table.evidence.exact) == (N, True)
+
+
 def test_a_snapshot_restores_arrays_that_share_memory_and_a_part_that_is_not_to_be_written():
     env, snapshots = snapshots_of(Walk(big=np.zeros((3, 4)), row=None, fixed=None))
     env.row, env.fixed = env.big[1], env.big[2].view()

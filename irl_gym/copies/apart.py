@@ -102,7 +102,8 @@ def _reached(layers: list[gym.Env]) -> Iterator[tuple[str, Any]]:
 
 
 _FIXED = (*CODE, tuple, frozenset, np.generic, types.CodeType)
-_OWN = (*_FIXED, gym.Space, gym.Env, *GENERATORS, enum.Enum, np.dtype, property, staticmethod, classmethod)
+_DESCRIBED = (property, staticmethod, classmethod, types.MethodType, types.BuiltinMethodType)
+_OWN = (*_FIXED, *_DESCRIBED, gym.Space, gym.Env, *GENERATORS, enum.Enum, np.dtype)
 """What is code, has no contents that change, or is looked after elsewhere."""
 
 

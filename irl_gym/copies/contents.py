@@ -16,9 +16,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.object_graphs import ATOMS, GENERATORS, attributes, children, slots
+from irl_gym.copies.object_graphs import ATOMS, GENERATORS, REFUSALS, attributes, children, slots
 from irl_gym.copies.references import References
 from irl_gym.copies.replacing import held_by
+from irl_gym.errors import NotEnumerable, NotTabular
 
 Look = Callable[[Any], Any]
 _LEAVES = (*GENERATORS, gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
@@ -74,7 +75,7 @@ def _looks(one: Any, references: References) -> Iterator[Look]:
     elif isinstance(one, set):
         yield set
     elif _opaque(one):
-        yield references.dumps
+        yield lambda one: _told(one, references)
         return
     if slots(kind):
         yield attributes
@@ -89,6 +90,13 @@ def _opaque(one: Any) -> bool:
     kind = type(one)
     own = any(getattr(kind, name) is not getattr(object, name) for name in ("__reduce_ex__", "__reduce__", "__getstate__"))
     return own or kind in copyreg.dispatch_table
+
+
+def _told(one: Any, references: References) -> bytes | None:
+    try:
+        return references.dumps(one)
+    except (*REFUSALS, NotTabular, NotEnumerable):  # a lock, a window: nothing shows what is in it
+        return None
 
 
 def _held(one: types.FunctionType) -> list[Any]:

@@ -1,6 +1,7 @@
 """What deepcopy leaves as it is leads a copy of an environment back to it: made anew, or refused."""
 
 import logging
+import threading
 import types
 import weakref
 
@@ -64,6 +65,11 @@ def functions_of_functions(env):
 def reads_a_list_that_stays(env):
     places = list(range(N))
     env.see = lambda: places[env.at]
+
+
+def closes_over_a_lock(env):
+    lock = threading.Lock()
+    env.see = lambda: env.at + lock.locked()
 
 
 def logs(env):
@@ -147,7 +153,16 @@ def of_the_class(env):
 
 
 @pytest.mark.parametrize(
-    "give", [closes_over_self, default, functions_of_functions, a_method_behind_a_function, reads_a_list_that_stays, logs]
+    "give",
+    [
+        closes_over_self,
+        default,
+        functions_of_functions,
+        a_method_behind_a_function,
+        reads_a_list_that_stays,
+        logs,
+        closes_over_a_lock,
+    ],
 )
 def test_a_function_that_holds_the_environment_holds_its_copy_in_a_copy(give):
     env = Line(give)

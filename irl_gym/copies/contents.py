@@ -8,9 +8,11 @@ else is found is a change for whoever asks to look into: the new part may have t
 import array
 import copyreg
 import enum
+import marshal
 import types
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import gymnasium as gym
@@ -23,6 +25,9 @@ from irl_gym.errors import NotEnumerable, NotTabular
 
 Look = Callable[[Any], Any]
 _LEAVES = (*GENERATORS, gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
+_MARSHALLED = frozenset({dict, list, tuple, set, frozenset})
+MANY = 300
+"""Containers inside above which plain ones are compared by what `marshal` writes of all of them, which is faster then."""
 _CONTAINERS = (np.ndarray, bytearray, array.array, dict, list, deque, set, tuple, frozenset, types.FunctionType)
 
 
@@ -35,7 +40,11 @@ class Contents:
     """
 
     def __init__(self, value: Any, references: References):
-        objects = _objects(value, references)
+        objects = [*_objects(value, references)]
+        if len(objects) > MANY and all(type(one) in _MARSHALLED for one in objects):
+            with suppress(ValueError):  # something else is in it, or it holds itself
+                self._held: list[Any] = [(_marshalled, value, _marshalled(value))]
+                return
         self._held = [(look, one, look(one)) for one in objects for look in _looks(one, references)]
 
     def unchanged(self) -> bool:
@@ -90,6 +99,10 @@ def _opaque(one: Any) -> bool:
     kind = type(one)
     own = any(getattr(kind, name) is not getattr(object, name) for name in ("__reduce_ex__", "__reduce__", "__getstate__"))
     return own or kind in copyreg.dispatch_table
+
+
+def _marshalled(one: Any) -> bytes:
+    return marshal.dumps(one, 2)  # the last version that does not depend on who else refers to a part
 
 
 def _told(one: Any, references: References) -> bytes | None:

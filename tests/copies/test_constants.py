@@ -136,6 +136,7 @@ INSIDE = {
     "a bytearray's": (lambda: large(bytearray(3)), lambda part: part.append(1)),
     "an object's": (lambda: large(Bag([1])), lambda part: setattr(part, "items", [2])),
     "a slot's": (lambda: large(Slot(1)), lambda part: setattr(part, "n", 2)),
+    "one of many": (lambda: [[{i: 1}] for i in range(400)], lambda part: part[0].update({0: True})),
     "a list in a tuple": (lambda: large(([1],)), lambda part: part[0].append(2)),
     "one that says how it is pickled": (lambda: large(Told([1])), lambda part: part.items.append(2)),
 }

@@ -64,7 +64,7 @@ class References:
         found = blocks(self.memories) if len(self.memories) > 1 else []
         if found:
             buffer = io.BytesIO()
-            pickler = self._sharing(buffer, 5)
+            pickler: Any = self._sharing(buffer, 5)
             pickler.reduced = Sharing(found)
             pickler.dump(value)
         return buffer.getvalue()

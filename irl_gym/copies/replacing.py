@@ -134,7 +134,8 @@ def held_by(code: Any) -> Iterator[Any]:
 
 def changeable(function: types.FunctionType, known: Callable[[Any], bool]) -> bool:
     """Does a function hold what may change: variables that it sets, or objects that are neither code nor known?"""
-    waiting, seen = [function], {id(function)}
+    waiting: list[Any] = [function]
+    seen = {id(function)}
     while waiting:
         one = waiting.pop()
         if (

@@ -103,7 +103,7 @@ def _block(bounds: Extent, arrays: list[Any]) -> Block:
         if start.__array_interface__["data"][0] != bounds[0]:
             raise shared(*arrays[:2])
         return Block(bounds, arrays, as_strided(start, ((bounds[1] - bounds[0]) // start.itemsize,), (start.itemsize,)))
-    raw = (ctypes.c_ubyte * (bounds[1] - bounds[0])).from_address(bounds[0])
+    raw: Any = (ctypes.c_ubyte * (bounds[1] - bounds[0])).from_address(bounds[0])
     return Block(bounds, arrays, np.frombuffer(raw, np.uint8))
 
 

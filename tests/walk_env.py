@@ -65,6 +65,19 @@ class Bag:
     items: list
 
 
+class Stubborn:
+    """Cannot be pickled, but copied."""
+
+    def __init__(self, n=0):
+        self.n = n
+
+    def __reduce_ex__(self, protocol):
+        raise TypeError("no pickle of me")
+
+    def __deepcopy__(self, memo):
+        return Stubborn(self.n)
+
+
 def snapshots_of(env, seed=0):
     env.reset(seed=seed)
     own = without_watchers(env)

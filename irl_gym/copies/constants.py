@@ -2,8 +2,7 @@
 
 A part is an attribute, or what an attribute holds (`world['map']`, `track.rows`): a map of thousands of cells beside the path
 that grows. It is a constant if its contents outlast a walk of random steps; a reset may build it anew. That walk is no proof,
-so constants are guarded: a snapshot looks at what stands in their places, and from time to time their contents are compared
-with what they were.
+so constants are guarded: after every step what stands in their places, and their contents, are compared with what they were.
 """
 
 import hashlib
@@ -14,9 +13,13 @@ from typing import Any
 import gymnasium as gym
 
 from irl_gym.copies.calls import called, seeded_globals, stepped
+from irl_gym.copies.contents import Contents
 from irl_gym.copies.layer_state import LayerState
-from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, REFUSALS, References, Steps, anew, attributes, reached
-from irl_gym.copies.stripped import GENERATORS, layers, replace_generators
+from irl_gym.copies.object_graphs import ABSENT, ATOMS, CODE, GENERATORS, REFUSALS, Steps, attributes, reached
+from irl_gym.copies.references import References, anew
+from irl_gym.copies.replacing import replace_generators
+from irl_gym.copies.shared_memory import Extent, extent
+from irl_gym.copies.stripped import layers
 from irl_gym.errors import NotEnumerable, NotTabular
 
 LARGE = 1024
@@ -39,26 +42,72 @@ class Home:
     """From the layer to the part."""
 
 
-@dataclass(frozen=True, eq=False)
 class Constant:
-    """A part that is held to be constant."""
+    """A part that is held to be constant.
 
-    home: Home
-    state: LayerState
-    """Of its layer."""
-    value: Any
-    digest: str | None
-    """Of its contents; None where it has no pickle, and is guarded by being the same object alone."""
-    size: int = 0
-    """Bytes of its pickle."""
+    Args:
+        home: its place.
+        state: of its layer.
+        references: pickle it, and what stands in its place.
+    """
+
+    def __init__(self, home: Home, state: LayerState, references: References):
+        self.home, self._state, self._references = home, state, references
+        self.value = self.now()
+        self.extents: list[Extent] = []
+        """The memory of its arrays, and of those of what stands in its place now."""
+        self._seen: list[tuple[Any, Contents]] = []
+        self.digest = self._read(self.value)
+        """Of its contents; None where it has no pickle, and is guarded by being the same object alone."""
 
     def now(self) -> Any:
         """What stands in its place."""
-        return reached(self.state.layer, self.home.steps)
+        return reached(self._state.layer, self.home.steps)
+
+    def unchanged(self) -> bool:
+        """Does it, and what stands in its place, hold what it held? Fast where nothing was put in the place of anything."""
+        now = self.now()
+        if self.digest is None:
+            return now is self.value
+        seen = all([contents.unchanged() for _, contents in self._seen])
+        return (seen and any(now is one for one, _ in self._seen)) or self._same(now)
+
+    def outlasted(self) -> bool:
+        """The same, by its pickle, which also tells 1 from True."""
+        return self._same(self.now()) if self.digest is not None else self.unchanged()
+
+    def _same(self, now: Any) -> bool:
+        self.extents, self._seen = [], []
+        return all([self._read(one) == self.digest for one in {id(one): one for one in (self.value, now)}.values()])
+
+    def _read(self, one: Any) -> str | None:
+        """What contents are known by, which are looked at from now on."""
+        try:
+            data = self._references.dumps(one)
+        except (*REFUSALS, NotTabular, NotEnumerable):
+            return None
+        self.extents += [extent(memory) for memory in self._references.memories]
+        self._seen.append((one, Contents(one, self._references)))
+        return hashlib.sha256(data).hexdigest()
 
     def of(self, names: frozenset[str]) -> bool:
         """Is it named here, or part of what is?"""
         return any(self.home.name == name or self.home.name.startswith((f"{name}[", f"{name}.")) for name in names)
+
+
+class Held:
+    """What a function, a class or a module holds, and no state does: it has to stay as it is."""
+
+    def __init__(self, what: str, value: Any, references: References):
+        self._what, self._contents = what, Contents(value, references)
+
+    def check(self) -> None:
+        """Raises NotTabular: it has changed."""
+        if not self._contents.unchanged():
+            raise NotTabular(
+                f"a step or reset changes {self._what}, which all copies share: expected all that changes in attributes. Keep "
+                "it in one that __init__ or reset makes; make a function that needs it a method that uses `self`."
+            )
 
 
 def unchanging(rehearsal: gym.Env) -> list[Home]:
@@ -99,25 +148,10 @@ def found_in(states: list[LayerState], homes: list[Home], references: References
     """The constants of an environment at these homes, each object once."""
     met: set[int] = set()
     for home in homes:
-        one = Constant(home, states[home.layer], None, None)
-        value = one.now()
+        value = reached(states[home.layer].layer, home.steps)
         if value is not ABSENT and id(value) not in met:
             met.add(id(value))
-            yield Constant(home, states[home.layer], value, *_known(value, references))
-
-
-def digest_of(value: Any, references: References) -> str | None:
-    """What the contents of a value are known by; None where it has no pickle."""
-    return _known(value, references)[0]
-
-
-def _known(value: Any, references: References) -> tuple[str | None, int]:
-    """The digest of a value's contents and the bytes of its pickle; None and 0 where it has none."""
-    try:
-        data = references.dumps(value)
-    except (*REFUSALS, NotTabular, NotEnumerable):
-        return None, 0
-    return hashlib.sha256(data).hexdigest(), len(data)
+            yield Constant(home, states[home.layer], references)
 
 
 def _large(layer: int, state: LayerState, references: References) -> Iterator[tuple[Home, str]]:

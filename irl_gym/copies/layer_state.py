@@ -4,8 +4,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from irl_gym.copies.object_graphs import slots
-from irl_gym.copies.stripped import SHARED
+from irl_gym.copies.object_graphs import SHARED, slots
 
 SPACES = frozenset({"observation_space", "action_space", "_observation_space", "_action_space"})
 LEFT_OUT = SHARED | SPACES | {"env", "render_mode", "_np_random_seed"}

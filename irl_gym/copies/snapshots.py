@@ -3,12 +3,12 @@
 What an environment is between two steps is what its layers hold: the attributes of the unwrapped environment and of each
 wrapper. A snapshot is one pickle of them all, so that what two attributes share stays shared. Not in it, but referred to:
 layers, spaces, code (functions, classes), random generators (their stand-ins, once `Snapshots` is made), and `constants`:
-large parts (a published table, a map) that a walk of random steps left alone. They are guarded: `take` notices one with
-something else in its place, and `changed_constants` one that was changed inside too; `take` asks it as well, the first times
-always, as what one step changes another may change back. The bytes never leave the process.
+large parts (a published table, a map) that a walk of random steps left alone. They are guarded: `check`, asked after every
+step since one may change back what another changed, notices one with something else in its place or inside. The bytes never
+leave the process.
 
-Not seen: state in class attributes, modules and closures; that two arrays are views of one memory. An object that says
-itself how it is pickled (`__getstate__`, `__reduce__`) is restored as it says.
+What functions close over, and classes and modules share with attributes, is in no state either, and refused when it changes.
+Not seen: other state in class attributes and modules. An object that says itself how it is pickled is restored as it says.
 """
 
 import copy
@@ -18,8 +18,9 @@ from typing import Any
 
 import gymnasium as gym
 
+from irl_gym.copies.apart import held_outside
 from irl_gym.copies.calls import called
-from irl_gym.copies.constants import Constant, Home, digest_of, found_in, unchanging
+from irl_gym.copies.constants import Constant, Held, Home, found_in, unchanging
 from irl_gym.copies.layer_state import LayerState
 from irl_gym.copies.object_graphs import (
     ABSENT,
@@ -27,19 +28,16 @@ from irl_gym.copies.object_graphs import (
     REFUSALS,
     Difference,
     Pairs,
-    References,
     Twin,
     attributes,
     put,
     reached,
-    twins,
 )
-from irl_gym.copies.stripped import awaken_generators, duplicate, layers, replace_generators
-from irl_gym.errors import InvalidParameter, NotEnumerable, NotTabular
-
-ALWAYS, BYTES, SELDOM = 1_000, 64 << 20, 100
-"""At so many states that are taken, or until so many bytes were looked at, the insides of constants are compared with what they
-were; then at one in so many."""
+from irl_gym.copies.references import References, twins
+from irl_gym.copies.replacing import held_by, replace_generators
+from irl_gym.copies.shared_memory import copied, extent, overlap
+from irl_gym.copies.stripped import awaken_generators, duplicate, layers
+from irl_gym.errors import InvalidParameter, NotCopied, NotEnumerable, NotTabular
 
 
 class ConstantChanged(Exception):
@@ -79,44 +77,69 @@ class Snapshots:
         self._refer_to_parts(self._references)
         self._constants = [*found_in(self._places, homes, self._guard)]
         self._constants += self._uncopied()
-        self._taken_so_far, sizes = 0, [one.size for one in self._constants]
-        self._always = min(ALWAYS, BYTES // max(sum(sizes), 1))
+        self._held_outside: dict[int, Held] = {}
         self._begin()
 
     def take(self) -> Any:
         """The state now.
 
         Raises:
-            ConstantChanged: something else is in the place of a constant, or inside it: `include` it, and start again.
+            ConstantChanged: something else is in the place of a constant, or shares its memory: `include` it, and start again.
             NotTabular: the environment made a new generator, or holds what cannot be copied.
         """
-        self._taken_so_far += 1
-        often = self._taken_so_far <= self._always or self._taken_so_far % SELDOM == 0
-        if often and (changed := self.changed_constants()):
-            raise ConstantChanged(changed[0])
         again: dict[int, Any] = {}
         for one in self._constants:
             now = one.now()
             if now is not one.value:
                 again |= self._again(one, now)
         with self._references.standing_for(again):
-            return self._taken()
+            state, memories = self._taken()
+            if self._hold():
+                state, memories = self._taken()
+        for memory in map(extent, memories):
+            for one in self._constants:
+                if any(overlap(memory, other) for other in one.extents):
+                    raise ConstantChanged(one.home.name)
+        return state
+
+    def check(self) -> None:
+        """Do the constants hold what they held?
+
+        Raises:
+            ConstantChanged: one does not: `include` it, and start again.
+            NotTabular: what a function, a class or a module holds does not.
+        """
+        for one in self._constants:
+            if not one.unchanged():
+                raise ConstantChanged(one.home.name)
+        for one in self._held_outside.values():
+            one.check()
+
+    def _hold(self) -> bool:
+        """Refer to what functions hold that were met for the first time: no state holds it. Were there any?"""
+        found, self._references.functions = self._references.functions, []
+        for function in found:
+            names = ", ".join(function.__code__.co_freevars) or "its defaults"
+            what = f"what the function {function.__qualname__} holds ({names})"
+            self._held_outside[id(function)] = Held(what, function, self._guard)
+            self._references.refer_inside([*held_by(function)])
+        return bool(found)
 
     def _again(self, one: Constant, now: Any) -> dict[int, Any]:
         """What a constant that was built anew with the same contents stands for, part by part."""
-        same = one.digest is not None and digest_of(now, self._guard) == one.digest
-        found = twins(now, one.value) if same else None
+        found = twins(now, one.value) if one.unchanged() else None
         if found is None:
             raise ConstantChanged(one.home.name)
         return found
 
-    def _taken(self) -> Any:
+    def _taken(self) -> tuple[Any, list[Any]]:
+        """The state, and what holds memory in it."""
         held = [place.read() for place in self._places]
         if self._own is not None:
             held.append({"state": called(self._own.get_state)})
         if not self._refuses_pickle:
             try:
-                return self._references.dumps(held)
+                return self._references.dumps(held), self._references.memories
             except (NotTabular, NotEnumerable):  # a uniform number that is kept is none to be copied
                 raise
             except REFUSALS:
@@ -144,19 +167,13 @@ class Snapshots:
         first, second = self._held(a), self._held(b)
         try:
             put(first, part.steps, reached(second, part.steps))
-            return self._references.dumps(first) if isinstance(a, bytes) else self._copied(first)
+            return self._references.dumps(first) if isinstance(a, bytes) else self._copied(first)[0]
         except (LookupError, NotEnumerable, NotTabular, *REFUSALS):
             return None
 
     def changed_constants(self) -> list[str]:
         """The constants that are none, since contents changed. `include` them, in snapshots of a fresh copy."""
-        return [one.home.name for one in self._constants if not self._unchanged(one)]
-
-    def _unchanged(self, one: Constant) -> bool:
-        now = one.now()
-        if digest_of(one.value, self._guard) != one.digest:
-            return False
-        return now is one.value or (one.digest is not None and digest_of(now, self._guard) == one.digest)
+        return [one.home.name for one in self._constants if not one.outlasted()]
 
     def include(self, names: Iterable[str]) -> None:
         """Put attributes, or constants inside them, into the state from now on: earlier states do not hold them.
@@ -178,6 +195,9 @@ class Snapshots:
         self._refer_to_parts(self._references)
         for constant in self._constants:
             self._references.refer_inside(constant.value)
+        for name, value in held_outside(self._layers):
+            self._held_outside[id(value)] = Held(name, value, self._guard)
+            self._references.refer_inside(value)
 
     def _refer_to_parts(self, references: References) -> None:
         for one in [*self._layers, *self._stand_ins]:
@@ -188,7 +208,7 @@ class Snapshots:
         for i, place in enumerate(self._places):
             for name, value in place.read().items():
                 if not self._can_be_copied(value):
-                    yield Constant(Home(i, place.prefix + name, ((False, name),)), place, value, None)
+                    yield Constant(Home(i, place.prefix + name, ((False, name),)), place, self._guard)
 
     def _can_be_copied(self, value: Any) -> bool:
         try:
@@ -202,20 +222,24 @@ class Snapshots:
                 return False
         return True
 
-    def _copied(self, held: Any) -> "_Copy":
+    def _copied(self, held: Any) -> tuple["_Copy", list[Any]]:
+        """A deep copy as a state, and what holds memory in it."""
         try:
-            return _Copy(copy.deepcopy(held, self._references.memo()))
+            made, memories = copied(lambda memo: copy.deepcopy(held, memo), self._references.memo())
+        except NotCopied:
+            raise
         except REFUSALS as error:
             if self._own is not None:
-                return _Copy(held)  # a handle of the environment's own, which only set_state understands
+                return _Copy(held), []  # a handle of the environment's own, which only set_state understands
             raise NotTabular(
                 f"the inner state can neither be pickled nor copied ({error}): expected attributes that copy.deepcopy copies. "
                 "Give the environment get_state() and set_state(state)."
             ) from error
+        return _Copy(made), memories
 
     def _held(self, state: Any) -> list[dict[str, Any]]:
         """What a state holds, as new objects."""
-        return called(lambda: self._references.loads(state)) if isinstance(state, bytes) else self._copied(state.held).held
+        return called(lambda: self._references.loads(state)) if isinstance(state, bytes) else self._copied(state.held)[0].held
 
     def _unlike(self, a: Any, b: Any) -> Iterator[Difference]:
         first, second = (self._references.loads(one) if isinstance(one, bytes) else one.held for one in (a, b))

@@ -7,23 +7,18 @@ so that an attribute that cannot be copied is named.
 """
 
 import copy
-import random
-import types
-from collections import deque
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 from gymnasium.wrappers import TimeLimit
 
-from irl_gym.copies.object_graphs import ATOMS, CODE, Twin, attributes, children
+from irl_gym.copies.apart import check_apart, held_outside, inside
+from irl_gym.copies.object_graphs import SHARED, attributes, children
+from irl_gym.copies.replacing import renew_functions
+from irl_gym.copies.shared_memory import copied
 from irl_gym.errors import NotCopied
 from irl_gym.watching import only_watches
 from irl_gym.wrappers import LearnedReward
-
-SHARED = frozenset({"spec", "metadata", "_metadata", "_cached_spec", "_saved_kwargs"})
-"""What describes a layer and never changes: neither copied nor part of a state."""
-GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)
 
 
 def layers(env: gym.Env) -> list[gym.Env]:
@@ -70,19 +65,32 @@ def looked_through(layer: gym.Env) -> bool:
 
 
 def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
-    """Copies of the kept layers, the innermost first: what points to a layer left out points to the next one inside."""
-    memo: dict[int, Any] = {}
+    """Copies of the kept layers, with arrays that share memory where the originals do."""
+    try:
+        return copied(lambda memo: _apart(kept, chain, memo), {})[0]
+    except NotCopied:
+        if not settable(chain[-1]):
+            raise
+        return copied(lambda memo: _apart(kept, chain, memo), {id(chain[-1]): chain[-1]})[0]
+
+
+def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
+    memo |= {id(one): one for _, value in held_outside(kept) for one in inside(value)}
+    made = _layers_copied(kept, chain, memo)
+    if made.unwrapped is not chain[-1]:  # else it speaks for itself
+        cells = renew_functions(made, {id(layer): memo[id(layer)] for layer in chain})
+        check_apart(layers(made), kept, memo, cells)
+    return made
+
+
+def _layers_copied(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
+    """The innermost first: what points to a layer left out points to the next one inside."""
     current: gym.Env = chain[-1]
     for layer in reversed(chain):
         if not any(layer is one for one in kept):
             memo[id(layer)] = current
-            continue
-        try:
+        elif id(layer) not in memo:  # else it is used as it is
             current = _copied_layer(layer, memo)
-        except NotCopied:
-            if layer is not chain[-1] or not settable(layer):
-                raise
-            memo[id(layer)] = current = layer
     return current
 
 
@@ -176,82 +184,3 @@ def awaken_generators(env: gym.Env) -> None:
         for part in children(space):
             inner = part.values() if isinstance(part, dict) else part if isinstance(part, list | tuple) else [part]
             waiting += [one for one in inner if isinstance(one, gym.Space)]
-
-
-def replace_generators(env: gym.Env, twin: Twin) -> list[Any]:
-    """Put a stand-in in the place of every random generator that can be reached from the environment's attributes.
-
-    Attributes of each layer, of nested objects and of spaces are searched, through dicts, lists, tuples, sets, deques and
-    arrays of objects; a bound method of a generator (`self.draw = rng.random`) becomes that of its stand-in. Generators
-    that only a closure, a class attribute or a module holds are not seen.
-
-    Args:
-        env: the caller's own copy; it is changed.
-        twin: maps a generator to its stand-in, any other object to None; asked once for each generator.
-
-    Returns:
-        The stand-ins, one a generator.
-    """
-    search = _Replacing(twin)
-    search.value(env)
-    while search.waiting:
-        search.inside(search.waiting.pop())
-    return list(search.stand_ins.values())
-
-
-class _Replacing:
-    """A walk over everything that an environment holds; `value` says what belongs in a place, `inside` puts it there."""
-
-    def __init__(self, twin: Twin):
-        self.twin = twin
-        self.stand_ins: dict[int, Any] = {}
-        self.originals: list[Any] = []  # kept alive, so that no other object takes the id of a replaced generator
-        self.seen: set[int] = set()
-        self.waiting: list[Any] = []
-
-    def value(self, value: Any) -> Any:
-        if type(value) in ATOMS or isinstance(value, CODE):
-            return value
-        if id(value) in self.stand_ins:
-            return self.stand_ins[id(value)]
-        if isinstance(value, tuple | frozenset):
-            return self._rebuilt(value)
-        if isinstance(value, types.BuiltinMethodType | types.MethodType):
-            owner = self.value(value.__self__)
-            return value if owner is value.__self__ else getattr(owner, value.__name__)
-        if id(value) in self.seen:
-            return value
-        stand_in = None if isinstance(value, dict | list | set | deque) else self.twin(value)
-        if stand_in is not None:
-            self.originals.append(value)
-            self.stand_ins[id(value)] = stand_in
-            self.seen.add(id(stand_in))
-            return stand_in
-        self.seen.add(id(value))
-        self.originals.append(value)
-        self.waiting.append(value)
-        return value
-
-    def _rebuilt(self, value: Any) -> Any:
-        parts = [part if type(part) in ATOMS else self.value(part) for part in value]
-        if all(new is old for new, old in zip(parts, value, strict=True)):
-            return value
-        kind: Any = type(value)
-        return kind(*parts) if hasattr(kind, "_fields") else kind(parts)
-
-    def inside(self, holder: Any) -> None:
-        if isinstance(holder, dict | list | deque):
-            for key, old in list(holder.items() if isinstance(holder, dict) else enumerate(holder)):
-                if type(old) not in ATOMS and (new := self.value(old)) is not old:
-                    holder[key] = new
-        elif isinstance(holder, set):
-            new = {self.value(part) for part in holder}
-            if new != holder:
-                holder.clear()
-                holder.update(new)
-        elif isinstance(holder, np.ndarray) and holder.dtype == object:
-            for place in np.ndindex(holder.shape):
-                holder[place] = self.value(holder[place])
-        for name, old in attributes(holder).items():
-            if (new := self.value(old)) is not old:
-                object.__setattr__(holder, name, new)

@@ -20,7 +20,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.copies.stripped import GENERATORS, layers
+from irl_gym.copies.object_graphs import GENERATORS
+from irl_gym.copies.stripped import layers
 
 UNSEEN = "a clock, or a generator that nothing of the environment's holds"
 PYTHONS, NUMPYS = "the module random", "the module numpy.random"

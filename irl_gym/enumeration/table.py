@@ -38,8 +38,6 @@ OnStates = Callable[[int, int], None]
 """Called with the number of states tried and found, as the search goes on."""
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 """In the words for an object that has none of its own: another one in every process."""
-GUARDED = 500
-"""States tried between two looks at what was held to be constant."""
 
 
 @dataclass(frozen=True)
@@ -131,13 +129,11 @@ class Enumeration(Limits):
     def _run(self, explorer: Explorer, env: gym.Env, on_states: OnStates) -> None:
         written = told = time.monotonic()
         try:
-            for count, _ in enumerate(explorer.expand(), start=1):
+            for _ in explorer.expand():
                 now = time.monotonic()
                 if now - told > 0.1:
                     on_states(explorer.explored.n_expanded, len(explorer.explored.keys))
                     told = now
-                if count % GUARDED == 0:
-                    _guard(explorer)
                 if self.checkpoint is not None and now - written > self.every:
                     _guard(explorer)
                     self._save(explorer, env)

@@ -89,7 +89,9 @@ class Trials:
 
         def run() -> Result:
             self.snapshots.restore(self.fresh)
-            return called(self.env.reset)[0], 0.0, False
+            observation = called(self.env.reset)[0]
+            self.snapshots.check()
+            return observation, 0.0, False
 
         return run
 
@@ -106,6 +108,7 @@ class Trials:
     def move(self, action: int) -> tuple[Any, float, bool, bool]:
         """A step from where the environment is: observation, reward, terminated, truncated; actions count from 0."""
         moved = stepped(self.env, action + self.first_action)
+        self.snapshots.check()
         self.truncated += moved[3]
         return moved
 

@@ -4,6 +4,7 @@ import re
 import types
 
 import minigrid  # noqa: F401  (registers its environments)
+import numpy as np
 import pytest
 from walk_env import Bag, Walk, snapshots_of
 
@@ -109,3 +110,64 @@ def test_an_attribute_may_share_an_object_of_a_constant():
     env.room.items.append(5)
     snapshots.restore(state)
     assert (env.room is env.rooms[3], env.room.items) == (True, [3, 4])
+
+
+def test_what_a_step_changes_inside_a_constant_is_noticed_after_any_number_of_states():
+    env, snapshots = snapshots_of(Walk(map=list(range(2000))))
+    for _ in range(1_100):
+        snapshots.take()
+    snapshots.check()
+    env.map[3] = 0
+    with pytest.raises(ConstantChanged, match="map"):
+        snapshots.check()
+
+
+def large(part):
+    return [part, *range(600)]
+
+
+INSIDE = {
+    "a list's": (lambda: large([1]), lambda part: part.append(2)),
+    "a dict's order": (lambda: large({1: 1, 2: 1}), lambda part: part.update({1: part.pop(1)})),
+    "a set's": (lambda: large({1}), lambda part: part.add(2)),
+    "an array's": (lambda: large(np.zeros(3)), lambda part: part.fill(1)),
+    "an array's shape": (lambda: large(np.zeros(3)), lambda part: part.resize((1, 3))),
+    "an array's objects": (lambda: large(np.full(3, None)), lambda part: part.fill(1)),
+    "a bytearray's": (lambda: large(bytearray(3)), lambda part: part.append(1)),
+    "an object's": (lambda: large(Bag([1])), lambda part: setattr(part, "items", [2])),
+    "a slot's": (lambda: large(Slot(1)), lambda part: setattr(part, "n", 2)),
+    "one of many": (lambda: [[{i: 1}] for i in range(400)], lambda part: part[0].update({0: True})),
+    "a list in a tuple": (lambda: large(([1],)), lambda part: part[0].append(2)),
+    "one that says how it is pickled": (lambda: large(Told([1])), lambda part: part.items.append(2)),
+}
+
+
+class Told(Bag):
+    def __reduce__(self):
+        return Told, (self.items,)
+
+
+class Slot:
+    __slots__ = ("n",)
+
+    def __init__(self, n):
+        self.n = n
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_check_sees_any_change_inside_a_constant(name):
+    make, change = INSIDE[name]
+    env, snapshots = snapshots_of(Walk(map=make()))
+    snapshots.check()
+    change(env.map[0])
+    with pytest.raises(ConstantChanged, match="map"):
+        snapshots.check()
+
+
+def test_a_part_that_is_put_in_the_place_of_its_equal_is_no_change():
+    env, snapshots = snapshots_of(Walk(map=large(np.zeros(3))))
+    env.map[0] = np.zeros(3)
+    snapshots.check()
+    env.map[0][1] = 5
+    with pytest.raises(ConstantChanged, match="map"):
+        snapshots.check()

@@ -9,23 +9,10 @@ import minigrid  # noqa: F401  (registers its environments)
 import numpy as np
 import pytest
 from minigrid.wrappers import FullyObsWrapper, ImgObsWrapper
-from walk_env import Bag, StandIn, Walk, frames, snapshots_of
+from walk_env import Bag, StandIn, Stubborn, Walk, frames, snapshots_of
 
 if gym_classics._backend is None:  # a second call warns
     gym_classics.register("gymnasium")
-
-
-class Stubborn:
-    """Cannot be pickled, but copied."""
-
-    def __init__(self, n=0):
-        self.n = n
-
-    def __reduce_ex__(self, protocol):
-        raise TypeError("no pickle of me")
-
-    def __deepcopy__(self, memo):
-        return Stubborn(self.n)
 
 
 ENVS = {
@@ -246,3 +233,12 @@ def test_snapshot_holds_slots():
     assert (env.count, env._Slotted__hidden) == (1, 1)
     snapshots.restore(empty)
     assert not hasattr(env, "count")
+
+
+def test_restore_gives_methods_back_that_were_put_in_each_others_place():
+    env, snapshots = snapshots_of(Walk())
+    env.reset, env.step = env.step, env.reset
+    state = snapshots.take()
+    env.reset, env.step = env.step, env.reset
+    snapshots.restore(state)
+    assert (env.reset.__func__, env.step.__func__) == (Walk.step, Walk.reset)

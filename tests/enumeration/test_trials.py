@@ -8,6 +8,8 @@ import pytest
 from enumeration_envs import RAND, Corridor, Slippery, same_table
 from gymnasium import spaces
 
+from irl_gym.copies.snapshots import ConstantChanged
+from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.outside import shared_mark
 from irl_gym.enumeration.table import Enumeration
 from irl_gym.enumeration.trials import Trials
@@ -258,3 +260,25 @@ def test_a_draw_from_the_shared_generators_is_seen_in_their_mark(draw):
         assert shared_mark() == before
         draw()
         assert shared_mark() != before
+
+
+class Lamp(Corridor):
+    """Lights a lamp in a large list, once it is told to."""
+
+    def __init__(self):
+        super().__init__(4)
+        self.lamps, self.told = [0, *range(600)], False
+
+    def step(self, action):
+        self.lamps[0] = int(self.told)
+        return self.moved(int(action))
+
+
+def test_a_step_that_changes_what_was_held_to_be_constant_is_noticed_at_once():
+    env = Lamp()
+    env.reset(seed=0)
+    trials = Trials(env, Limits(), frozenset(), counting=False)
+    trials.seeded([0], lambda: trials.move(1))
+    env.told = True
+    with pytest.raises(ConstantChanged, match="lamps"):
+        trials.seeded([0], lambda: trials.move(1))

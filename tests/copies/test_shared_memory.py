@@ -1,0 +1,124 @@
+"""What is written through one array and read through another, which shares its memory, is the same in a copy."""
+
+import array
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import scipy.sparse
+from gymnasium import spaces
+from walk_env import Stubborn, Walk, snapshots_of
+
+from irl_gym.copies.snapshots import ConstantChanged
+from irl_gym.enumeration.table import Enumeration
+from irl_gym.errors import NotCopied
+
+N = 5
+
+
+class Line(gym.Env):
+    """A line of five cells; the place is written into one of two things that share memory and read from the other."""
+
+    observation_space, action_space = spaces.Discrete(N), spaces.Discrete(2)
+
+    def __init__(self, held, write, read):
+        self.held, self.write, self.read = held, write, read
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.write(self.held, 0)
+        return int(self.read(self.held)), {}
+
+    def step(self, action):
+        place = int(self.read(self.held)) + (1 if action else -1)
+        self.write(self.held, min(max(place, 0), N - 1))
+        return int(self.read(self.held)), 0.0, place == N - 1, False, {}
+
+
+def put(first, at):
+    def write(held, value):
+        held[first][at] = value
+
+    return write
+
+
+def pair(made, *parts):
+    return [made, *(part(made) for part in parts)]
+
+
+SHARED = {
+    "a row": lambda: Line(pair(np.zeros((3, 4)), lambda big: big[1]), put(1, 2), lambda held: held[0][1, 2]),
+    "two parts": lambda: Line(pair(np.zeros(9), lambda b: b[:6], lambda b: b[3:])[1:], put(0, 4), lambda held: held[1][1]),
+    "a part run backwards": lambda: Line(pair(np.zeros((4, 3)).T, lambda b: b[::-1, 1:]), put(1, (0, 0)), lambda h: h[0][2, 1]),
+    "a field": lambda: Line(pair(np.zeros(3, "i4, f8"), lambda b: b["f0"]), put(1, 1), lambda held: held[0][1]["f0"]),
+    "objects": lambda: Line(pair(np.full((3, 4), 0, object), lambda b: b[1]), put(1, 2), lambda held: held[0][1, 2]),
+    "a row of a large one": lambda: Line(pair(np.zeros((40, 40)), lambda b: b[1]), put(1, 2), lambda held: held[0][1, 2]),
+    "what cannot be pickled": lambda: Line([*pair(np.zeros(3), lambda b: b[1:]), Stubborn()], put(1, 0), lambda h: h[0][1]),
+    "a sparse matrix's": lambda: Line(
+        pair(scipy.sparse.csr_matrix(np.eye(3)), lambda b: b.data[1:]), put(1, 0), lambda held: held[0][1, 1]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_arrays_that_share_memory_share_it_in_copies(name):
+    table = Enumeration().table(SHARED[name](), 0.9)
+    P = table.mdp.P.toarray().reshape(N, 2, N)[: N - 1].argmax(-1)
+    assert (P.tolist(), table.evidence.exact) == ([[max(s - 1, 0), s + 1] for s in range(N - 1)], True)
+
+
+def over(buffer):
+    return Line(pair(buffer, lambda one: np.frombuffer(one, np.uint8)), put(0, 0), lambda held: held[1][0])
+
+
+def tensors():
+    torch = pytest.importorskip("torch")
+    return Line(pair(torch.zeros(3, 4), lambda big: big[1]), put(1, 2), lambda held: held[0][1, 2])
+
+
+REFUSED = {
+    "a bytearray": lambda: over(bytearray(4)),
+    "an array.array": lambda: over(array.array("B", [0] * 4)),
+    "tensors": tensors,
+    "a masked array": lambda: Line(pair(np.zeros(3), np.ma.asarray), put(1, 1), lambda held: held[0][1]),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_else_shares_memory_is_refused(name):
+    with pytest.raises(NotCopied, match="share memory, which copies of them would not"):
+        Enumeration().table(REFUSED[name](), 0.9)
+
+
+class Told(Line):
+    def get_state(self):
+        return int(self.read(self.held))
+
+    def set_state(self, state):
+        self.write(self.held, state)
+
+
+def test_get_state_and_set_state_mend_what_is_refused():
+    buffer = bytearray(4)
+    env = Told([buffer, np.frombuffer(buffer, np.uint8)], put(0, 0), lambda held: held[1][0])
+    table = Enumeration().table(env, 0.9)
+    assert (table.mdp.n_states, table.evidence.exact) == (N, True)
+
+
+def test_a_snapshot_restores_arrays_that_share_memory_and_a_part_that_is_not_to_be_written():
+    env, snapshots = snapshots_of(Walk(big=np.zeros((3, 4)), row=None, fixed=None))
+    env.row, env.fixed = env.big[1], env.big[2].view()
+    env.fixed.flags.writeable = False
+    state = snapshots.take()
+    env.big = env.row = None
+    snapshots.restore(state)
+    env.row[2] = 5
+    assert (env.big[1, 2], env.fixed.flags.writeable, np.shares_memory(env.fixed, env.big)) == (5, False, True)
+
+
+def test_a_constant_that_shares_memory_with_the_state_is_none():
+    env, snapshots = snapshots_of(Walk(map=np.zeros((40, 40)), row=None))
+    snapshots.take()
+    env.row = env.map[3]
+    with pytest.raises(ConstantChanged, match="map"):
+        snapshots.take()

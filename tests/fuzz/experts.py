@@ -4,6 +4,7 @@ import base64
 import json
 import pickle
 import zipfile
+from collections import deque
 
 import gymnasium as gym
 import numpy as np
@@ -20,7 +21,7 @@ CELLS = spaces.MultiDiscrete([4, 4])
 SETTINGS = {
     "policy_class": {"__module__": "stable_baselines3.a2c"}, "_last_original_obs": {":type:": "ndarray"},
     "observation_space": {":type:": "<class 'gymnasium.spaces.box.Box'>"},
-    "ep_info_buffer": {":serialized:": base64.b64encode(pickle.dumps([{"r": 1.5, "l": 9}, {"r": np.float64(2)}])).decode()},
+    "ep_info_buffer": {":serialized:": base64.b64encode(pickle.dumps(deque([{"r": 1.5}, {"r": np.float64(2)}]))).decode()},
 }  # fmt: skip
 
 

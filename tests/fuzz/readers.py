@@ -210,6 +210,7 @@ READERS = {
     "diagnosis of a run": Reader(without_digests, runs.read_diagnosis, weight=0.3, of_run=True),
     "resumed run": Reader(nothing, runs.read_folder, weight=0.5, of_run=True),
     "continued run": Reader(runs.write_unfinished, runs.read_unfinished, weight=0.01, of_run=True),
+    "finished run, continued": Reader(without_digests, runs.read_unfinished, weight=0.1, of_run=True),
     "continued export": Reader(runs.write_export, runs.read_export, ".exporting-*/**/*", weight=0.1),
 }
 """By what they read. A run is made once for all tests, and copied."""

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import io
 import json
 import shutil
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from forgetting import without_digests
 from fuzz.sound import sound_episode, sound_reward, sound_table
 from numbered import Numbered
+from rich.console import Console
 
 from irl_gym import export
 from irl_gym.claims import claim
@@ -24,6 +26,7 @@ from irl_gym.page.report import write_report
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
 from irl_gym.policies import as_distribution
+from irl_gym.report import print_report
 from irl_gym.run_folder import RunFolder, read_record
 from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
@@ -96,9 +99,9 @@ def copied(folder):
 
 
 def read_unfinished(folder):
-    with copied(folder) as copy, understood(copy):
-        recover_and_retrain(ASKED, copy)
-        read_run(copy)
+    """And the report on the terminal, which is rendered there."""
+    with copied(folder) as copy:
+        print_report(recover_and_retrain(ASKED, copy), Console(file=io.StringIO()))
 
 
 def exported(root, demonstrator):

@@ -31,7 +31,8 @@ wheel: $(READY)
 	$(BIN)/check-wheel-contents dist
 
 bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on every environment, the paper (about an hour)
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m slow --ignore tests/fuzz
+	$(BIN)/python -m pytest -m slow tests/fuzz -s
 	$(BIN)/python -m pytest -m 'hypothesis and not slow' --hypothesis-profile thorough
 	$(BIN)/python scripts/measure_speed.py
 	$(BIN)/python scripts/measure_retraining.py

@@ -262,13 +262,13 @@ def parse_reveal(parts: Sequence[str]) -> Reveals:
     for part in parts:
         name, equals, values = part.partition("=")
         try:
-            read = ast.literal_eval(values)
-        except (ValueError, SyntaxError, RecursionError, MemoryError):
+            read = int(values) if values.isdecimal() else ast.literal_eval(values)
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):  # of too many digits, and of unhashable keys
             read = None
-        if not equals or not (values.isdecimal() or isinstance(read, list)):
+        if not equals or not isinstance(read, int if values.isdecimal() else list):
             raise InvalidParameter(
                 f"reveal has {part!r}: expected name=number of values, such as step_count=100, or a list of them, such as "
                 "last=[None,0,1]; or known, or none."
             )
-        found[name] = read if isinstance(read, list) else int(values)
+        found[name] = read
     return found

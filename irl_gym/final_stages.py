@@ -63,7 +63,8 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
     """
     told: dict[str, Any] = {}
     try:
-        write_json(folder / "diagnosis.json", diagnose(_case(loop)).to_json())
+        with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
+            write_json(folder / "diagnosis.json", diagnose(_case(loop)).to_json())
     except IrlGymError as error:
         told["no_diagnosis"] = f"{type(error).__name__}: {error}"
     why = _too_much(loop)
@@ -73,7 +74,8 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
     assert isinstance(loop.world, TableWorld)  # or there is too much
     for name, examine in (("widths", _widths), ("path", _path)):
         try:
-            arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
+            with understood(loop.folder.path):
+                arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
     np.savez(folder / "ambiguity.npz", **arrays)
@@ -137,6 +139,6 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
 def report(loop: "Loop", folder: Path) -> dict[str, Any]:
     """Write the page, from what is on disk; the table is at hand."""
     table = loop.world.table if isinstance(loop.world, TableWorld) else None
-    with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
+    with understood(loop.folder.path):
         write_report(read_run(loop.folder.path, table), folder / "report.html")
     return {}

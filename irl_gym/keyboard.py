@@ -103,7 +103,7 @@ def _parsed(overrides: str, n: int) -> dict[str, int]:
             )
         if key.lower() in (QUIT, AGAIN, HELP):
             raise InvalidParameter(f"keys has {part!r}: {QUIT}, {AGAIN} and {HELP} end, begin again and help. Use another key.")
-        if not (text.isascii() and text.isdigit() and int(text) < n):
+        if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) < n):
             raise InvalidParameter(f"keys has {part!r}: expected an action from 0 to {n - 1}, counted from 0.")
         if asked.setdefault(key, int(text)) != int(text):
             raise InvalidParameter(f"keys has {key!r} twice, for {asked[key]} and {text}: expected each key once.")

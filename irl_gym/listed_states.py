@@ -15,7 +15,7 @@ from gymnasium import spaces
 
 from irl_gym.checks import any_array
 from irl_gym.errors import InvalidMDP, UnknownObservation
-from irl_gym.integer_spaces import first_of, from_numbers, ranges
+from irl_gym.integer_spaces import checked_members, first_of, from_numbers, ranges
 from irl_gym.states import Numbering
 
 
@@ -26,6 +26,7 @@ class ListedStates(Numbering):
     Raises:
         InvalidMDP: no state, numbers that are not strictly increasing or not as many as the space's observations have, or
             terminal copies that do not stand behind the ordinary rows.
+        UnknownObservation: numbers of no member of the space.
     """
 
     space: spaces.Space
@@ -44,6 +45,7 @@ class ListedStates(Numbering):
         width = len(ranges(self.space))
         if numbers.shape[1] != width:
             raise InvalidMDP(f"numbers have shape {numbers.shape}: expected (n, {width}), as many as {self.space} has.")
+        checked_members(self.space, numbers)
         different = numbers[1:] != numbers[:-1]
         first = different.argmax(axis=1)
         rows = np.arange(len(first))

@@ -17,6 +17,7 @@ from irl_gym.intervals import as_interval
 from irl_gym.optimality import AT_STAKE
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
+from irl_gym.run_reader import understood
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged
 from irl_gym.told_rewards import told_of_reward
@@ -28,8 +29,14 @@ COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 
 
 def print_report(report: Report, console: Console) -> None:
-    """Print what a run found; brackets and colons in names are no markup."""
-    for part in render(report):
+    """Print what a run found; brackets and colons in names are no markup.
+
+    Raises:
+        RunIncomplete: a run that was continued, and whose files say what no run says; then nothing is printed.
+    """
+    with understood(report.out):
+        parts = [*render(report)]
+    for part in parts:
         console.print(part, markup=False, emoji=False)
 
 

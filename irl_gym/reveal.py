@@ -173,7 +173,7 @@ def _attribute(env: gym.Env, name: str) -> Any:
         holder: Any = value
         try:
             value = holder[ast.literal_eval(item)]
-        except (LookupError, TypeError) as error:
+        except (LookupError, TypeError, ValueError, SyntaxError) as error:  # the last two of a number such as 01
             raise InvalidParameter(
                 f"{name[: part.start()]} has no part [{item}] ({type(error).__name__}: {error}): expected one that it has. It "
                 f"is {str(value)[:90]}."

@@ -12,6 +12,7 @@ Axes: n states of k numbers.
 """
 
 import base64
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -235,4 +236,4 @@ class Training:
             returns = tuple(float(as_numbers(one["r"])) for one in getattr(noted, "items", ()))
         except (ValueError, KeyError, TypeError):
             returns = ()
-        return cls(returns, under)
+        return cls(returns if math.isfinite(sum(returns)) else (), under)  # a record holds no NaN

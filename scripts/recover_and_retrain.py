@@ -27,13 +27,13 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
         with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the report is piped
             asked = arguments.experiment()
             report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show, command)
+        print_report(report, console)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
         return 130
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
-    print_report(report, console)
     return 0
 
 

@@ -229,6 +229,8 @@ def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(dataset)
         ({"reveal": ("key",)}, InvalidParameter, "reveal has 'key': expected name=number"),
         ({"reveal": ("key=two",)}, InvalidParameter, "reveal has 'key=two'"),
         ({"reveal": ("key=-2",)}, InvalidParameter, "reveal has 'key=-2'"),
+        ({"reveal": (f"key={'9' * 5_000}",)}, InvalidParameter, "reveal has 'key=9999"),  # more digits than Python reads
+        ({"reveal": ("key=[{[]: 0}]",)}, InvalidParameter, "reveal has 'key="),
         ({"reveal": ("key=[0, key]",)}, InvalidParameter, r"reveal has 'key=\[0, key\]'"),
         ({"reveal": ("known", "key=2")}, InvalidParameter, "reveal has 'known'"),
         ({"start_seeds": (-1,), "learner": "feature-lp"}, InvalidParameter, "-1"),

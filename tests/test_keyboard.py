@@ -66,6 +66,7 @@ def test_keys_of_ones_own_come_on_top():
         ("abc=1", "'abc=1': expected key=action"), ("w", "'w': expected key=action"), ("w=4", "an action from 0 to 3"),
         ("w=-1", "an action from 0 to 3"), ("w=up", "an action from 0 to 3"), ("q=1", "q, r and [?] end"),
         ("R=1", "q, r and [?] end"), ("w=1,w=2", "'w' twice"),
+        ("w=" + "9" * 5_000, "an action from 0 to 3"),
     ],
 )  # fmt: skip
 def test_keys_that_cannot_be_are_named(keys, says):

@@ -1,9 +1,11 @@
 """Runs and exports are killed at random, again and again, and end in the bytes in which they would have ended.
 
 A kill comes before a file operation in the folder, whose number is drawn: what is done between two of them leaves no trace.
+Each is of a process of its own, forked from one that has imported the library: importing it takes longer than an export.
 A hundred kills: `pytest -m slow tests/test_kills.py`.
 """
 
+import contextlib
 import json
 import re
 import signal
@@ -13,33 +15,45 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stopped import HANG
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-KILLED = """
-import importlib, json, os, runpy, signal, sys
-number, folder, changes, script, *arguments = sys.argv[1:]
-for path, value in json.loads(changes).items():
+FORKING = """
+import importlib, json, os, runpy, signal, sys, traceback
+changes, script = json.loads(sys.argv[1]), sys.argv[2]
+runpy.run_path(script, run_name="imported")
+for path, value in changes.items():
     module, _, name = path.partition(":")
     setattr(importlib.import_module(module), name, value)
-count = 0
 
-def hook(event, given):
-    global count
-    if event not in ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir"):
-        return
-    if not any(isinstance(one, str | os.PathLike) and os.path.abspath(one).startswith(folder) for one in given[:2]):
-        return
-    count += 1
-    if count == int(number):
-        os.kill(os.getpid(), signal.SIGKILL)
+def forked(number, folder, arguments):
+    count, told, code = 0, os.open(folder + ".txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1
+    os.dup2(told, 1), os.dup2(told, 2)
 
-sys.addaudithook(hook)
-sys.argv = [script, *arguments]
-try:
-    runpy.run_path(script, run_name="__main__")
-finally:
-    print("operations", count, file=sys.stderr)
+    def hook(event, given):
+        nonlocal count
+        if event not in ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir"):
+            return
+        if not any(isinstance(one, str | os.PathLike) and os.path.abspath(one).startswith(folder) for one in given[:2]):
+            return
+        count += 1
+        if count == number:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    sys.addaudithook(hook)
+    sys.argv = [script, *arguments]
+    try:
+        runpy.run_path(script, run_name="__main__")
+        code = 0
+    except SystemExit as end:
+        code = end.code or 0
+    except BaseException:
+        traceback.print_exc()
+    print("operations", count, flush=True)
+    os._exit(code)
+
+for line in sys.stdin:
+    child = os.fork() or forked(*json.loads(line))
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 RUN = ("recover_and_retrain.py", "--out", ("--env-kwargs", "is_slippery=false", "--episodes", "5", "--total-timesteps", "2048"))
 EXPORT = ("export_dataset.py", "--root", ("--env-id", "FrozenLake-v1", "--dataset-id", "lake/best-v0", "--episodes", "40"))
@@ -48,13 +62,20 @@ TIMED = re.compile(r"(.*/)?(agent\.zip|tensorboard/.*|\.stages/.*)")
 """Files that hold the time."""
 
 
-def start(what, folder, number=0):
-    """A script in a folder, killed before the file operation of a number; never for 0."""
+@contextlib.contextmanager
+def starting(what):
+    """Starts a script in a folder, killed before the file operation of a number, never for 0; returns what it said, if not."""
     script, flag, arguments = what
-    command = [str(number), str(folder), json.dumps(OFTEN), str(SCRIPTS / script), flag, str(folder), *arguments]
-    made = subprocess.run([sys.executable, "-c", KILLED, *command], capture_output=True, text=True, timeout=HANG)
-    assert made.returncode in (0, -signal.SIGKILL), made.stderr
-    return made
+    command = [sys.executable, "-c", FORKING, json.dumps(OFTEN), str(SCRIPTS / script)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
+
+        def start(folder, number=0):
+            print(json.dumps([number, str(folder), [flag, str(folder), *arguments]]), file=parent.stdin, flush=True)
+            code, said = int(parent.stdout.readline()), Path(f"{folder}.txt").read_text()
+            assert code in (0, -signal.SIGKILL), said
+            return None if code else said
+
+        yield start
 
 
 def content(folder):
@@ -71,15 +92,17 @@ def content(folder):
 def test_what_is_killed_at_random_ends_in_the_same_bytes(tmp_path, what, kills):
     rng, done, round_ = np.random.default_rng(kills), 0, 0
     (tmp_path / "00").mkdir()
-    whole = start(what, tmp_path / "00")
-    operations, expected = int(whole.stderr.split()[-1]), content(tmp_path / "00")
-    while done < kills:
-        folder = tmp_path / f"{(round_ := round_ + 1):02}"
-        folder.mkdir()
-        for again in range(4):  # killed three times at most, then it is left to end
-            made = start(what, folder, int(rng.integers(1, operations)) if again < 3 and done < kills else 0)
-            if made.returncode == 0 or (what == EXPORT and (folder / "lake").exists() and not list(folder.glob(".*"))):
-                break
-            done += 1
-        found = content(folder)
-        assert [name for name in {*expected, *found} if expected.get(name) != found.get(name)] == [], (round_, done)
+    with starting(what) as start:
+        operations, expected = int(start(tmp_path / "00").split()[-1]), content(tmp_path / "00")
+    with starting(what) as start:  # whose sets have another order
+        while done < kills:
+            folder = tmp_path / f"{(round_ := round_ + 1):02}"
+            folder.mkdir()
+            for again in range(4):  # killed three times at most, then it is left to end
+                said = start(folder, int(rng.integers(1, operations)) if again < 3 and done < kills else 0)
+                if said or (what == EXPORT and (folder / "lake").exists() and not list(folder.glob(".*"))):
+                    break
+                done += 1
+            found = content(folder)
+            assert [name for name in {*expected, *found} if expected.get(name) != found.get(name)] == [], (round_, done)
+    print(f"\n{what[0]}: {done} kills in {round_} folders, each before one of {operations} operations")

@@ -146,6 +146,12 @@ def test_numbers_of_another_space_are_refused():
         ListedStates(spaces.Discrete(4), np.array([[0, 1]]))
 
 
+@pytest.mark.parametrize("number", [-1, 4, 2**62])
+def test_numbers_of_no_member_are_refused(number):
+    with pytest.raises(UnknownObservation, match=f"observation {number} is outside Discrete"):
+        ListedStates(spaces.Discrete(4), np.array([[number]]))
+
+
 def test_negative_and_very_large_numbers_stay_integers():
     numbers = np.array([[-1], [2**60 + 1]])
     states = ListedStates(spaces.Box(-1, 2**61, (1,), np.int64), numbers)

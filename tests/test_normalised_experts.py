@@ -1,7 +1,11 @@
 """An expert that was trained under VecNormalize sees what it saw; one without its statistics is noticed."""
 
+import base64
+import collections
+import json
 import os
 import pickle
+import zipfile
 
 import gymnasium as gym
 import numpy as np
@@ -166,6 +170,15 @@ def test_a_zip_of_ppo_says_whether_it_was_under_vecnormalize(tmp_path, how):
 def test_a_zip_says_what_its_agent_returned_in_training(cart):
     folder, model, _ = cart
     assert training_of(folder / "agent.zip").returns == tuple(one["r"] for one in model.ep_info_buffer)
+
+
+@pytest.mark.parametrize("returns", [(1.0, np.nan), (np.inf,), (1e308, 1e308)])
+def test_returns_without_a_mean_are_none(tmp_path, returns):
+    noted = base64.b64encode(pickle.dumps(collections.deque({"r": one} for one in returns))).decode()
+    told = {"observation_space": {":type:": "box.Box'>"}, "ep_info_buffer": {":serialized:": noted}}
+    with zipfile.ZipFile(tmp_path / "agent.zip", "w") as archive:
+        archive.writestr("data", json.dumps(told))
+    assert FromFile(str(tmp_path / "agent.zip")).trained() == {}
 
 
 def test_an_expert_says_what_a_doctor_needs(cart):

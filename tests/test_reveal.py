@@ -113,7 +113,7 @@ def test_a_value_that_is_not_listed_is_refused():
         env.step(1)
 
 
-@pytest.mark.parametrize("name", ["goal[7]", "bag['lock']", "first[0]"])
+@pytest.mark.parametrize("name", ["goal[7]", "bag['lock']", "first[0]", "goal[01]"])
 def test_a_part_that_is_not_there_is_refused(name):
     with pytest.raises(InvalidParameter, match="has no part"):
         Reveal(Counter(), {name: 4}).reset()

@@ -14,6 +14,7 @@ from irl_gym.given import FromFile, check_agent, fingerprint
 from irl_gym.listed_states import ListedStates
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
+from irl_gym.shown import read_shown, write_shown
 from irl_gym.states import StateIndex
 from irl_gym.tabular_vec_env import TabularVecEnv
 
@@ -92,6 +93,16 @@ def test_a_file_beside_it_that_says_nothing_is_refused(toy_text, tmp_path):
     (tmp_path / "agent.shown.npz").write_text("nothing")
     with pytest.raises(InvalidParameter, match=r"agent\.shown\.npz cannot be read"):
         load_expert(tmp_path / "agent.zip")
+
+
+def test_rows_of_what_is_never_observed_are_refused(tmp_path):
+    write_shown(tmp_path / "agent.zip", ListedStates(spaces.Discrete(4), np.array([[1], [3]])), None)
+    with np.load(tmp_path / "agent.shown.npz") as told:
+        np.savez(tmp_path / "agent.shown.npz", **{**told, "numbers": np.array([[1], [4]])})
+    with pytest.raises(
+        InvalidParameter, match=r"does not say what agent\.zip is shown .observation 4 is outside Discrete\(4\)"
+    ):
+        read_shown(tmp_path / "agent.zip")
 
 
 def test_the_file_beside_it_is_part_of_what_a_run_knows_again(toy_text, tmp_path):

@@ -5,12 +5,14 @@ import json
 import numpy as np
 import pytest
 from forgetting import without_digests
+from rich.console import Console
 
 from irl_gym.diagnosis import diagnose_unfinished
 from irl_gym.errors import RunConflict, RunIncomplete
 from irl_gym.experiment import Experiment
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
+from irl_gym.report import print_report
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import FOR_PEOPLE, LOGS, read_json, write_json
 from irl_gym.runs import read_run
@@ -180,3 +182,19 @@ def test_a_record_that_does_not_tell_its_demonstrations_leaves_the_loss_to_the_r
     write_json(copied / ".stages" / "demonstrations.json", {"files": []})
     asked = {**run.config, "epsilon": 0.1}
     assert recomputed(copied, asked, run.metrics["reward"], run.table, run.expert, run.tabular) is None
+
+
+def test_a_continued_run_whose_record_says_what_none_says_is_refused_in_our_words(copied):
+    without_digests(copied)
+    write_json(copied / ".stages" / "expert.json", {"files": []})
+    report = recover_and_retrain(ASKED, copied)
+    with pytest.raises(RunIncomplete, match=r"run cannot be understood .KeyError: 'seconds'.: expected files as a run leaves"):
+        print_report(report, Console())
+
+
+def test_a_doctor_who_cannot_read_a_record_says_so_in_his(copied):
+    record = read_json(copied / ".stages" / "reward.json")
+    write_json(copied / ".stages" / "reward.json", record | {"stats": 5})
+    (copied / ".stages" / "ambiguity.json").unlink()
+    report = recover_and_retrain(ASKED, copied)
+    assert "cannot be understood (" in report.stages["ambiguity"]["no_diagnosis"]

@@ -2,16 +2,19 @@
 
 from types import SimpleNamespace
 
+import gymnasium as gym
 import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
+from irl_gym.arguments import parse_reveal
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.datasets import load_minari
 from irl_gym.experiment import Experiment, parse_keywords
 from irl_gym.features import OneHot, Table, Unravel
 from irl_gym.given import FromFile
 from irl_gym.imports import from_arrays, from_d4rl, from_frame, from_imitation, from_pairs, from_rollouts
+from irl_gym.keyboard import controls_of, keys_of_line, keys_typed
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.linear_reward import LinearReward
@@ -25,6 +28,7 @@ from irl_gym.tabulate import make
 P = np.array([[0.5, 0.5], [1.0, 0.0]])
 D0 = np.array([1.0, 0.0])
 SPACE = spaces.Discrete(16)
+LAKE = gym.make("FrozenLake-v1")
 MORE = spaces.Dict(a=spaces.Tuple((spaces.Discrete(3), spaces.MultiBinary(2))), b=spaces.Box(-1, 1, (2,)))
 LOG = {"observations": [0, 4, 8], "actions": [1, 1, 2], "terminals": [False, False, True]}
 INTO = {"space": SPACE, "n_actions": 4}
@@ -48,6 +52,8 @@ VALUES = [*PLAIN, *(made for one in PLAIN for made in inside(one))]
 TEXTS = [
     "", "=", "a", "a=", "=1", "a=1", "a b=1", "a=[", "a=" + "[" * 10_000, "a=" + "9" * 5_000, "a=1e999", "a=NaN", "{", "{}",
     "[]", "{" * 10_000, '{"a": 1, "a": 2}', "{1: 2}", "\ud800=1", "a=\x00", " {}", "{}x", '{"a": ' + "[" * 10_000, "é=1", "3",
+    "a=[{[]: 1}]", "\x1b[", "\x1b[" + "1" * 5_000, "\x1b[A~", "left=1", "=" * 9, "a=³", "a=٣", "a=[1](2)", "a=" + "(" * 5_000,
+    "a=[1e999, None]",
 ]  # fmt: skip
 
 
@@ -125,9 +131,16 @@ def call(which, key, value):
     return function(**fine)
 
 
+READ = [
+    parse_keywords, parse_reveal, lambda parts: controls_of(LAKE, ",".join(parts)),
+    lambda parts: [*keys_typed("".join(parts)), *keys_of_line("".join(parts))],
+]  # fmt: skip
+"""What reads text that somebody types."""
+
+
 def texts(which, more):
-    """Read the arguments of an environment from text."""
+    """Read what is typed: an environment's arguments, what is revealed, keys."""
     parts = [TEXTS[which % len(TEXTS)]]
     if more % 2:
         parts.append(TEXTS[more % len(TEXTS)])
-    return parse_keywords(parts)
+    return READ[which // len(TEXTS) % len(READ)](parts)

@@ -4,9 +4,12 @@ A change that keeps a file's structure (a value of its json, an array of its zip
 checksum, so it reaches what reads the file. A `Change` says where and what, in numbers that hypothesis can shrink.
 """
 
+import base64
 import csv
 import io
 import json
+import pickle
+import pickletools
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +35,13 @@ VALUES = [
     {"type": "Box"}, nested(30), [0] * 1000, DEEP,
 ]  # fmt: skip
 """In place of a value of json."""
+OPCODES = [
+    *(pickle.dumps(one, 4)[2:-1] for one in (10**400, -1, 7, 0.5, np.nan, np.inf, "x", "mean", b"x" * 8)),
+    *(b"\x8c" + bytes([len(one)]) + one for one in (b"f2", b"f4", b"f8", b"f16", b"O8", b"c8", b"i8", b"U4", b">", b"|", b"F")),
+    *(bytes([one]) for one in b"N])}(.Rbaesu0\x81\x85\x86\x88\x89\x93\x94"), b"h\x00", b"h\x05", b"cos\nsystem\n",
+    b"cnumpy\ndtype\n",
+]  # fmt: skip
+"""In place of one of a pickle, or beside it."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +98,9 @@ def of_value(value, change: Change):
     for key in to[:-1]:
         holder = holder[key]
     held = holder[to[-1]]
+    if to[-1] == ":serialized:" and change.kind % 2:  # Stable-Baselines3's name of a pickle
+        holder[to[-1]] = base64.b64encode(of_opcodes(base64.b64decode(held), change)).decode()
+        return value
     if isinstance(held, str) and held[:1] in "{[" and held and change.kind % 2:
         try:
             holder[to[-1]] = json.dumps(of_value(json.loads(held), change))
@@ -259,7 +272,25 @@ def of_arrow(path, change):
             writer.write_table(table)
 
 
+def of_opcodes(raw: bytes, change: Change) -> bytes:
+    """A pickle with an opcode changed, doubled, left out, or another put in."""
+    starts = [at for _, _, at in pickletools.genops(raw)]
+    parts = [raw[at:end] for at, end in zip(starts, [*starts[1:], len(raw)], strict=True)]
+    at = change.place % len(parts)
+    other = change.pick(OPCODES if change.kind % 3 else parts, "value")
+    change.pick([
+        lambda: parts.__setitem__(at, other), lambda: parts.insert(at, other), lambda: parts.__setitem__(at, other),
+        lambda: parts.insert(at, parts[at]), lambda: parts.pop(at),
+        lambda: parts.__setitem__(at, of_bytes(parts[at], change)),
+    ], "kind")()  # fmt: skip
+    return b"".join(parts)
+
+
+def of_pickle(path, change):
+    path.write_bytes(of_opcodes(path.read_bytes(), change))
+
+
 STRUCTURED = {
     ".json": of_json, ".npz": of_npz, ".zip": of_npz, ".hdf5": of_hdf5, ".csv": of_text, ".tsv": of_text, ".arrow": of_arrow,
-    ".parquet": of_arrow,
+    ".parquet": of_arrow, ".pkl": of_pickle,
 }  # fmt: skip

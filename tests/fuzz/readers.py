@@ -1,39 +1,32 @@
 """Everything that reads a stranger's file: a valid one to begin with, and what is true of whatever is accepted."""
 
-import json
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
+from forgetting import without_digests
+from fuzz import experts, runs
+from fuzz.sound import SPACE, sound_episode, sound_reward, sound_table
 
 from irl_gym.ambiguity.lambda_path import LambdaPath, lambda_path
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
-from irl_gym.datasets import read_minari, write_minari
+from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrations import Episode
-from irl_gym.diagnoses.unfinished import left_behind
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.enumeration.explored import Explored, load_explored
-from irl_gym.experts import load_expert
 from irl_gym.features import OneHot, Table, Unravel
 from irl_gym.imports import from_d4rl, from_frame
 from irl_gym.linear_reward import LinearReward, load_reward
-from irl_gym.page.report import write_report
-from irl_gym.policies import as_distribution
+from irl_gym.recorded import recorded_environment
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RunFolder
-from irl_gym.run_reader import understood
-from irl_gym.runs import read_run
 from irl_gym.shards import Shards
 from irl_gym.states import StateIndex
 from irl_gym.table_files import load_table, save_table
 from irl_gym.tabulate import tabulate
 
 LAKE = {"is_slippery": True}
-SPACE = spaces.Discrete(16)
 ROWS = [Episode(np.array([0, 4, 8, 9]), np.array([1, 1, 2]), np.array([0.0, 0.0, 1.0]), True, False, seed=i) for i in range(3)]
 
 
@@ -51,24 +44,16 @@ class Reader:
     """Errors that are none of the library's, and which it says that it raises."""
     weight: float = 1
     """Share of the inputs."""
+    of_run: bool = False
+    """Is a run in the folder before it is filled?"""
+
+
+def nothing(folder):
+    """A folder that is left as it is."""
 
 
 def lake():
     return tabulate(gym.make("FrozenLake-v1", **LAKE), gamma=0.9, check_steps=20)
-
-
-def sound_table(table):
-    """P's rows sum to 1 or 0, its indices are inside, and all is finite."""
-    mdp, P = table.mdp, table.mdp.P
-    sums = P.sum(axis=1)
-    assert ((abs(sums - 1) < 1e-6) | (sums == 0)).all() and P.shape == (mdp.n_states * mdp.n_actions, mdp.n_states)
-    assert P.indices.min(initial=0) >= 0 and P.indices.max(initial=0) < mdp.n_states and P.indptr[-1] == P.nnz == P.data.size
-    assert abs(mdp.d0.sum() - 1) < 1e-6 and 0 < mdp.gamma < 1 and table.states.n_states == mdp.n_states
-    for array in (P.data, mdp.d0, table.reward.values, table.payments.mean, table.payments.deviation):
-        assert array.dtype.kind == "f" and np.isfinite(array).all()
-    assert table.reward.values.shape == table.payments.mean.shape == (mdp.n_states, mdp.n_actions)
-    assert table.payments.entries is None or table.payments.entries.shape == (P.nnz,)
-    assert str(table.evidence)
 
 
 def read_table(folder):
@@ -81,25 +66,17 @@ def write_search(folder):
     found.add(1, 0, 1, (1,))
     found.end(2)
     found.expand(0, [(0, 0, 0.5, 0.0), (0, 1, 0.5, 1.0), (1, -1, 1.0, 0.0)])
-    found.save(folder / "search.npz", spaces.Discrete(3), {"seed": 0})
+    found.save(folder / "search.npz", gym.spaces.Discrete(3), {"seed": 0})
 
 
 def read_search(folder):
-    found = load_explored(folder / "search.npz", spaces.Discrete(3), 2, {"seed": 0})
+    found = load_explored(folder / "search.npz", gym.spaces.Discrete(3), 2, {"seed": 0})
     n = len(found.keys)
     assert all(-1 <= parent < i for i, parent in enumerate(found.parents)) and len(found.scripts) == n == len(found.ids)
     assert all(-len(found.ends) <= one < n for one in found.successors) and np.isfinite(list(found.rewards)).all()
     assert all(0 <= key < 3 for key in found.keys)
     for i in range(found.n_expanded):
         assert all(0 <= action < 2 for action, *_ in found.lines_of(i))
-
-
-def sound_reward(reward):
-    if isinstance(reward, TabularReward):
-        assert np.isfinite(reward.values).all() and reward.values.ndim in (1, 2) and np.isfinite(reward.tolerance)
-        return
-    assert np.isfinite(reward.alpha).all() and reward.alpha.shape == (reward.features.n_features,)
-    assert np.isfinite(reward.tabular(StateIndex(SPACE)).values).all() and reward.features.scaling
 
 
 def write_rewards(folder):
@@ -136,25 +113,6 @@ def read_path(folder):
     assert str(path) and path.to_json() and np.isfinite(path.at(path.lambda_0 / 2).values).all()
 
 
-def write_experts(folder):
-    np.savez(folder / "actions.npz", actions=np.arange(16) % 4)
-    np.savez(folder / "known.npz", probabilities=np.vstack([np.full((15, 4), 0.25), np.full((1, 4), np.nan)]))
-    with zipfile.ZipFile(folder / "agent.zip", "w") as archive:
-        archive.writestr("data", json.dumps({"policy_class": {"__module__": "stable_baselines3.a2c"}, "observation_space": {}}))
-
-
-def read_experts(folder):
-    for path in sorted(folder.glob("*.npz")):
-        table = load_expert(path)
-        assert table.ndim in (1, 2) and table.size
-        if table.ndim == 2 and table.dtype.kind == "f":
-            known = table[~np.isnan(table).all(axis=1)]
-            assert np.isfinite(known).all() and (known >= 0).all() and (abs(known.sum(axis=1) - 1) < 1e-6).all()
-        else:
-            assert table.dtype.kind in "iub" and table.min() >= 0
-    load_expert(folder / "agent.zip")
-
-
 def write_shards(folder):
     Shards(folder / "shards", SPACE).append(ROWS)
 
@@ -164,11 +122,6 @@ def read_shards(folder):
         path.unlink()
     for one in Shards(folder / "shards", SPACE):
         assert len(one.actions) == len(one.rewards) == len(one.observations) - 1 >= 1
-
-
-def sound_episode(one):
-    assert len(one.actions) == len(one.rewards) == len(one.observations) - 1 >= 1 and one.actions.dtype.kind in "iu"
-    assert np.isfinite(one.rewards).all()
 
 
 def write_dataset(data_format):
@@ -184,6 +137,13 @@ def read_dataset(folder):
         sound_episode(one)
         assert (one.actions >= 0).all() and (one.actions < 4).all() and (one.seed is None or one.seed >= 0)
         assert states.encode_batch(one.observations).max() < 16
+
+
+def read_environment(folder):
+    made = recorded_environment(load_minari("lake-v0", root=folder))
+    assert made.spec.id in gym.registry and made.spec.entry_point == gym.registry[made.spec.id].entry_point
+    assert all(one.entry_point.startswith(("gymnasium.wrappers:", "irl_gym.")) for one in made.spec.additional_wrappers)
+    made.close()
 
 
 def write_d4rl(folder):
@@ -228,42 +188,29 @@ def read_frames(folder):
         sound_episodes(from_frame(path, space=SPACE, n_actions=4))
 
 
-def sound_run(folder):
-    run = read_run(folder)
-    sound_table(run.table)
-    sound_reward(run.learned)
-    for policy in (run.expert, run.agent):
-        as_distribution(policy, run.table.mdp.n_states, run.table.mdp.n_actions)
-    assert all(one.shape == (16,) for one in run.widths.values()) and run.curve.value.dtype.kind == "f"
-
-
-def read_page(folder):
-    with understood(folder):
-        write_report(read_run(folder), folder.parent / "page.html")
-
-
-def read_folder(folder):
-    config = json.loads((folder.parent / "config.json").read_text())
-    run = RunFolder(folder, config)
-    for stage in ("table", "reward", "agent"):
-        run.done(stage)
-    left_behind(folder)
-
-
 READERS = {
     "table": Reader(lambda folder: save_table(lake(), folder / "table.npz"), read_table, weight=3),
     "search": Reader(write_search, read_search, weight=2),
-    "reward": Reader(write_rewards, read_rewards),
-    "linear reward": Reader(write_linear, read_rewards, weight=2),
+    "reward": Reader(write_rewards, read_rewards, weight=1.5),
+    "linear reward": Reader(write_linear, read_rewards, weight=1.5),
     "lambda path": Reader(write_path, read_path),
-    "expert": Reader(write_experts, read_experts),
-    "shards": Reader(write_shards, read_shards),
+    "expert": Reader(experts.write_experts, experts.read_experts, weight=1.5),
+    "statistics": Reader(experts.write_statistics, experts.read_numbers, weight=3),
+    "what an agent is shown": Reader(experts.write_what_is_shown, experts.read_what_is_shown, "*.shown.npz", weight=1.5),
+    "shards": Reader(write_shards, read_shards, weight=2),
     "Minari, HDF5": Reader(write_dataset("hdf5"), read_dataset, "lake-v0/data/*", weight=3),
     "Minari, Arrow": Reader(write_dataset("arrow"), read_dataset, "lake-v0/data/**/*", weight=2),
-    "D4RL": Reader(write_d4rl, read_d4rl),
+    "environment of a dataset": Reader(write_dataset("hdf5"), read_environment, "lake-v0/data/metadata.json", weight=0.5),
+    "D4RL": Reader(write_d4rl, read_d4rl, weight=2),
     "frames": Reader(write_frames, read_frames, weight=2),
-    "run": Reader(lambda folder: None, sound_run, "**/*", weight=2),
-    "page of a run": Reader(lambda folder: None, read_page, "*.*", weight=0.1),
-    "resumed run": Reader(lambda folder: None, read_folder, "**/*"),
+    "run": Reader(nothing, runs.sound_run, weight=0.7, of_run=True),
+    "run without digests": Reader(without_digests, runs.sound_run, weight=1.5, of_run=True),
+    "page of a run": Reader(runs.write_page, runs.read_page, "*.*", weight=0.1, of_run=True),
+    "page of two runs": Reader(runs.write_page, runs.read_comparison, "*.*", weight=0.1, of_run=True),
+    "diagnosis of a run": Reader(without_digests, runs.read_diagnosis, weight=0.3, of_run=True),
+    "resumed run": Reader(nothing, runs.read_folder, weight=0.5, of_run=True),
+    "continued run": Reader(runs.write_unfinished, runs.read_unfinished, weight=0.01, of_run=True),
+    "finished run, continued": Reader(without_digests, runs.read_unfinished, weight=0.1, of_run=True),
+    "continued export": Reader(runs.write_export, runs.read_export, ".exporting-*/**/*", weight=0.1),
 }
 """By what they read. A run is made once for all tests, and copied."""

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from enumeration_envs import Board, Corridor, Racetrack, Shows, same_table
 from gymnasium import spaces
-from mended import Shows
 
 from irl_gym.copies.snapshots import Snapshots
 from irl_gym.enumeration.explorer import Explorer

@@ -200,7 +200,7 @@ def test_the_finite_lp_learns_from_a_dataset_with_slack_for_errors(dataset, argu
 
 
 def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(dataset):
-    with pytest.raises(DatasetMissing, match="There are some/lake-v0"):
+    with pytest.raises(DatasetMissing, match="Name one of these: some/lake-v0"):
         asked(learner="feature-lp", **(dataset | {"dataset": "other-v0"}))
 
 

@@ -246,7 +246,7 @@ def test_feature_lp_without_a_table_is_refused_with_its_mend(tmp_path, asked, er
 
 def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(runs, tmp_path):
     root = runs("table, features").out / "dataset"
-    with pytest.raises(DatasetMissing, match=f"'lake-v0' is not under .* There are {LAKE_DATA}"):
+    with pytest.raises(DatasetMissing, match=f"'lake-v0' is not under .* Name one of these: {LAKE_DATA}"):
         recover_and_retrain(
             Experiment(None, 0.99, dataset="lake-v0", dataset_root=str(root), learner=rounds()), tmp_path / "run"
         )

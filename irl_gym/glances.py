@@ -24,15 +24,22 @@ class Glances:
 
     def __init__(self, world: TableWorld | SteppedWorld, told: Callable[[int, Policy], None]):
         self.world, self.told = world, told
+        self._updates: int | None = None
         self._steps: list[int] = []
         self._values: list[float] = []
         self._actions: list[np.ndarray] = []
         self._returns: list[np.ndarray] = []
 
     def see(self, steps: int, policy: Policy) -> None:
-        """Judge the policy as it is after some environment steps."""
+        """Judge the policy as it is after some environment steps; one that was not updated since the last time is as it was."""
         self.told(steps, policy)
         self._steps.append(steps)
+        updates = getattr(getattr(policy, "model", None), "_n_updates", None)  # SB3 counts its gradient steps there
+        if updates is not None and updates == self._updates:
+            for kept in (self._values, self._actions, self._returns):
+                kept.extend(kept[-1:])
+            return
+        self._updates = updates
         if isinstance(self.world, TableWorld):
             actions = tabular_actions(policy, self.world.table.states)
             self._actions.append(actions.astype(np.min_scalar_type(self.world.table.mdp.n_actions)))

@@ -200,20 +200,9 @@ def test_tabulate_refuses_a_continuous_space(env_id, offender):
         table_of(gym.make(env_id))
 
 
-@pytest.mark.parametrize(
-    ("env", "message"),
-    [
-        (gym.make("Blackjack-v1"), r"Reveal"),
-        (
-            gym.make("Taxi-v4", fickle_passenger=True),
-            r"hides part of the state.*fickle_step: True against False.*Reveal\(env\)",
-        ),
-    ],
-    ids=["naturals", "fickle taxi"],
-)
-def test_tabulate_says_what_is_missing(env, message):
-    with pytest.raises(NotTabular, match=message):
-        table_of(env)
+def test_tabulate_says_what_is_missing():
+    with pytest.raises(NotTabular, match="Reveal"):
+        table_of(gym.make("Blackjack-v1"))
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def test_enumeration_of_blackjack_with_the_dealer_shown_agrees_with_the_table_of
 
 
 def test_enumeration_of_fickle_taxi_says_what_to_reveal():
-    with pytest.raises(HiddenState, match=r"fickle_step.*Reveal\(env\)"):
+    with pytest.raises(HiddenState, match=r"hides part of the state.*fickle_step: True against False.*Reveal\(env\)"):
         table_of(gym.make("Taxi-v4", fickle_passenger=True))
 
 

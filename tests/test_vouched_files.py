@@ -196,6 +196,6 @@ def test_a_doctor_who_cannot_read_a_record_says_so_in_his(copied):
     record = read_json(copied / ".stages" / "reward.json")
     write_json(copied / ".stages" / "reward.json", record | {"stats": 5})
     (copied / ".stages" / "ambiguity.json").unlink()
-    with pytest.raises(RunIncomplete, match="cannot be understood .TypeError"):
+    with pytest.raises(RunIncomplete, match=r"cannot be understood .TypeError"):
         recover_and_retrain(ASKED, copied)
     assert "cannot be understood (" in read_json(copied / ".stages" / "ambiguity.json")["no_diagnosis"]

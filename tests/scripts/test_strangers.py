@@ -42,11 +42,23 @@ def stranger(planned, tmp_path, evil):
             folder = without_digests(shutil.copytree(planned / "plain", tmp_path / name))  # a forger writes others
             config = json.loads((folder / "config.json").read_text()) | changes
             (folder / "config.json").write_text(json.dumps(config))
+            agreeing(folder, config)
             for one in without:
                 (folder / one).unlink()
         return tmp_path
 
     return make
+
+
+def agreeing(folder, config):
+    """Have a run's other files say what its config.json says, else the run is refused for that."""
+    metrics = json.loads((folder / "metrics.json").read_text())
+    if config["env_id"] is None:
+        metrics["demonstrations"] |= {"given": True, "episodes_only": True}
+    else:
+        environment = json.loads((folder / "environment.json").read_text())
+        (folder / "environment.json").write_text(json.dumps(environment | {"id": config["env_id"]}))
+    (folder / "metrics.json").write_text(json.dumps(metrics))
 
 
 COMMANDS = {"report": ("--run", "a"), "doctor": ("--run", "a"), "compare": ("a", "b")}

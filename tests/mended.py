@@ -48,6 +48,19 @@ def _text(node):
     return "".join(one.value if isinstance(getattr(one, "value", 0), str) else "\0" for one in parts)
 
 
+def told(breaks, *given):
+    """What the error says that something breaks with."""
+    with pytest.raises((errors.IrlGymError, FileNotFoundError)) as caught:
+        breaks(*given)
+    return str(caught.value)
+
+
+def unsaid(cases, *files):
+    """The mends of these files that no case says."""
+    said = " ".join(says for says, *_ in cases)
+    return [one for one in named(*files) if not re.search(one, said)]
+
+
 def done(code, env):
     """What a mend makes."""
     import irl_gym.counting

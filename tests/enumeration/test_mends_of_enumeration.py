@@ -1,0 +1,303 @@
+"""The mends that errors about copies and searches of environments name are executed, and serve."""
+
+import copy
+import pickle
+import threading
+import types
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from enumeration_envs import Board, Corridor
+from gymnasium.wrappers import TimeAwareObservation
+from mended import GAMMA, done, mends, told, unsaid
+
+import irl_gym
+from irl_gym.counting import Interaction
+from irl_gym.demonstrations import collect
+from irl_gym.enumeration.draws import Draws
+from irl_gym.enumeration.table import Enumeration
+from irl_gym.features import Functions
+from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.simulator import Simulator
+
+pytestmark = pytest.mark.usefixtures("unchecked")
+
+
+class Told(Corridor):
+    """Keeps its cell in a part that `see` reads and `put` writes, as it is told."""
+
+    def __init__(self, give=lambda env: None):
+        super().__init__()
+        self.box = [0]
+        give(self)
+
+    def put(self, cell):
+        self.box[0] = cell
+
+    def see(self):
+        return self.box[0]
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.put(self.cell)
+        return self.see(), {}
+
+    def step(self, action):
+        self.cell = self.see()
+        _, *rest = self.moved(int(action))
+        self.put(self.cell)
+        return self.see(), *rest
+
+
+class OfTheModule(Told):
+    def see(self):
+        return SHARED[0]
+
+
+class Set(Told):
+    """Can be read and set."""
+
+    def get_state(self):
+        return int(self.see())
+
+    def set_state(self, cell):
+        self.put(cell)
+
+
+def of_a_function(env):
+    box = env.box
+    env.put = lambda cell: box.__setitem__(0, cell)
+
+
+SHARED = [0]
+
+
+def of_the_module(env):
+    env.mine = SHARED
+    env.put = types.MethodType(lambda self, cell: self.mine.__setitem__(0, cell), env)
+
+
+def of_a_buffer(env):
+    env.box = bytearray(4)
+    env.seen = np.frombuffer(env.box, np.uint8)
+    env.see = types.MethodType(lambda self: int(self.seen[0]), env)
+
+
+def of_one(env):
+    env.box = bytearray(4)
+    env.see = types.MethodType(lambda self: int(np.frombuffer(self.box, np.uint8)[0]), env)
+
+
+def locked(env):
+    env.lock = threading.Lock()
+
+
+class Leaves(Told):
+    """Leaves the lock out of its copies."""
+
+    def __deepcopy__(self, memo):
+        made = object.__new__(type(self))
+        memo[id(self)] = made
+        vars(made).update({name: copy.deepcopy(value, memo) for name, value in vars(self).items() if name != "lock"})
+        return made
+
+
+class Breaks(Told):
+    def __deepcopy__(self, memo):
+        raise OSError("no more devices")
+
+
+class BreaksAndIsSet(Breaks, Set):
+    pass
+
+
+class Renews(Corridor):
+    """Makes a new generator at each reset, or only for a seed."""
+
+    def __init__(self, always):
+        super().__init__()
+        self.always, self.rng = always, np.random.default_rng()
+
+    def reset(self, *, seed=None, options=None):
+        if self.always or seed is not None:
+            self.rng = np.random.default_rng(seed)
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        return self.moved(int(action) if self.rng.random() < 0.8 else 1 - int(action))
+
+
+class Late(Told):
+    """What cannot be copied comes with a step, or sooner."""
+
+    def __init__(self, sooner=False):
+        super().__init__()
+        self.sooner = sooner
+
+    def reset(self, *, seed=None, options=None):
+        if self.sooner:
+            locked(self)
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        locked(self)
+        return super().step(action)
+
+
+class LateAndSet(Late, Set):
+    pass
+
+
+class Fails(Corridor):
+    """Knows its first action only, until it is mended."""
+
+    def __init__(self, known=(0,)):
+        super().__init__()
+        self.known = known
+
+    def step(self, action):
+        return self.moved(self.known[int(action)])
+
+
+class Crowded(Corridor):
+    """Each reset draws one of very many first observations."""
+
+    def __init__(self):
+        super().__init__()
+        self.observation_space = gym.spaces.Discrete(10**9)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.cell = int(self.np_random.integers(10**9))
+        return self.cell, {}
+
+    def step(self, action):
+        return self.cell, 0.0, bool(action), False, {}
+
+
+def table(env, **how):
+    return Enumeration(**how).table(env, GAMMA)
+
+
+def coded(env, **how):
+    """What the first mend of a table's error makes."""
+    return done(mends(told(lambda: table(env, **how)))[0], env)
+
+
+def searched(path, **how):
+    """A search that was stopped after so many states, gone on with in another environment."""
+    told(lambda: table(Board(6), checkpoint=path / "search", max_states=10))
+    return table(Board(6), checkpoint=path / "search", **how)
+
+
+def anew(path, env):
+    (path / "search").unlink()
+    return table(env, checkpoint=path / "search")
+
+
+class Turns(Board):
+    """Goes another way after it was told to."""
+
+    turned = False
+
+    def step(self, action):
+        return super().step((action + self.turned) % 4)
+
+
+def turned(path, before):
+    """A search of one that turned before it went on, or before it began anew."""
+    env = Turns(6)
+    told(lambda: table(env, checkpoint=path / "search", max_states=10))
+    Turns.turned = True
+    try:
+        before()
+        return table(env, checkpoint=path / "search")
+    finally:
+        Turns.turned = False
+
+
+def damaged(path):
+    (path / "search").write_bytes(b"?")
+    return table(Board(6), checkpoint=path / "search")
+
+
+def stand_in():
+    draws, real = Draws(), np.random.default_rng(0)
+    return draws, draws.twin(real), real
+
+
+TIMED = TimeAwareObservation(gym.make("FrozenLake-v1", is_slippery=False), flatten=False, normalize_time=False)
+
+
+class Always:
+    """Goes down always, whatever is paid."""
+
+    def plan(self, *_, **__):
+        return self
+
+    def predict(self, observations, state=None, episode_start=None, deterministic=False):
+        return np.ones(np.shape(observations["obs"]), dtype=np.int64), None
+
+
+def from_episodes(env):
+    """What TrajectoryLP learns where no table can be made."""
+    features = Functions(lambda seen: np.asarray(seen["obs"], dtype=float).reshape(-1, 1), 1)
+    world = Simulator(env, Always(), GAMMA)
+    return TrajectoryLP(features, trajectories=5, horizon=5, max_rounds=1).fit(world, collect(env, Always(), 2, seed=0))
+
+
+SET_STATE = "give the environment get_state() and set_state(state)."
+CASES = [
+    # searches
+    ("Raise it, as in `tabulate(env, gamma=..., by=Enumeration(max_states=...))`; with a `checkpoint` file it continues where "
+     "it stopped.", lambda path: table(Board(6), max_states=10), lambda path: table(Board(6), max_states=40), searched),
+    ("expected the same environment and settings. Name another file, or remove it to begin anew.",
+     lambda path: searched(path, seed=1), lambda path: table(Board(6), checkpoint=path / "other", seed=1),
+     lambda path: anew(path, Board(6))),
+    ("expected the same environment. Name another file, or remove it to begin anew.",
+     lambda path: turned(path, lambda: None), lambda path: turned(path, (path / "search").unlink)),
+    ("Remove it to begin anew.", damaged, lambda path: anew(path, Board(6))),
+    ("expected a file in a folder that exists. Make it.", lambda path: table(Board(3), checkpoint=path / "new" / "search"),
+     lambda path: (path / "new").mkdir() or table(Board(3), checkpoint=path / "new" / "search")),
+    ("Fix what reset draws, as with `irl_gym.seeded_starts.SeededStarts(env, seeds=(0,))`.",
+     lambda path: table(Crowded(), start_runs=300), lambda path: table(coded(Crowded(), start_runs=300))),
+    ("It belongs to a search of this process; give the environment its own generator back first.",
+     lambda path: pickle.dumps(stand_in()[1]), lambda path: pickle.dumps(stand_in()[2])),
+    ("Give the environment its own generator back.",
+     lambda path: stand_in()[1].random(), lambda path: stand_in()[2].random()),
+    # copies
+    ("Make the function a method that uses `self`; or " + SET_STATE,
+     lambda path: table(Told(of_a_function)), lambda path: table(Told()), lambda path: table(Set(of_a_function))),
+    ("Mend the environment.", lambda path: table(Fails()), lambda path: table(Fails((0, 1)))),
+    ("Keep it in one that __init__ or reset makes; make a function that needs it a method that uses `self`.",
+     lambda path: table(OfTheModule(of_the_module)), lambda path: table(Told())),
+    ("Count what it does instead, with `irl_gym.tabulate(env, gamma=gamma, by=irl_gym.counting.Interaction())`; or, in the "
+     "environment, make it in __init__, and anew in reset only for a seed.",
+     lambda path: table(Renews(True)), lambda path: table(Renews(False)),
+     lambda path: irl_gym.tabulate(Renews(True), gamma=GAMMA, by=Interaction(500))),
+    ("Hold one of them, and make the other where it is needed; or " + SET_STATE,
+     lambda path: table(Told(of_a_buffer)), lambda path: table(Told(of_one)), lambda path: table(Set(of_a_buffer))),
+    ("Make it in __init__ or reset, and " + SET_STATE,
+     lambda path: table(Late()), lambda path: table(LateAndSet(sooner=True))),
+    ("Give it get_state() and set_state(state), or mend its __deepcopy__.",
+     lambda path: table(Breaks()), lambda path: table(BreaksAndIsSet()), lambda path: table(Leaves())),
+    ("Give Told get_state() and set_state(state), or a __deepcopy__ that leaves this attribute out.",
+     lambda path: table(Told(locked)), lambda path: table(Set(locked)), lambda path: table(Leaves(locked))),
+    ("Leave the wrapper out; or learn from episodes alone, with TrajectoryLP.",
+     lambda path: table(TIMED), lambda path: table(TIMED.env), lambda path: from_episodes(TIMED)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("says", "breaks", "mended"), [(says, breaks, rest) for says, breaks, *rest in CASES],
+                         ids=[one[0] for one in CASES])  # fmt: skip
+def test_a_mend_that_an_error_about_copies_or_searches_names_serves(tmp_path, says, breaks, mended):
+    assert says in told(breaks, tmp_path) and all(each(tmp_path) is not None for each in mended)
+
+
+def test_every_mend_that_an_error_about_copies_or_searches_names_is_executed():
+    root = Path(irl_gym.__file__).parent
+    assert not unsaid(
+        CASES, *(one.relative_to(root) for part in ("copies", "enumeration") for one in root.glob(f"{part}/*.py"))
+    )

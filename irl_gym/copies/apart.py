@@ -77,9 +77,10 @@ def inside(value: Any) -> list[Any]:
 
 
 def _leads_back(name: str, one: Any) -> NotCopied:
+    mend = "Make it a tuple, if it never changes; or make" if isinstance(one, list) else "Make"
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "
-        "variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
+        f"variable or a weak reference, which copies share: expected all that changes in attributes alone. {mend} the "
         "function a method that uses `self`; or give the environment get_state() and set_state(state)."
     )
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-from enumeration_envs import Board, Corridor
-from gymnasium.wrappers import TimeAwareObservation
+from enumeration_envs import Board, Corridor, Shows
+from gymnasium.wrappers import FilterObservation, TimeAwareObservation
 from mended import GAMMA, done, mends, told, unsaid
 
 import irl_gym
@@ -228,6 +228,7 @@ def stand_in():
     return draws, draws.twin(real), real
 
 
+DICT = Shows(gym.spaces.Dict({"cell": gym.spaces.Discrete(7)}), lambda cell: {"cell": cell})
 TIMED = TimeAwareObservation(gym.make("FrozenLake-v1", is_slippery=False), flatten=False, normalize_time=False)
 
 
@@ -268,8 +269,9 @@ CASES = [
     ("Give the environment its own generator back.",
      lambda path: stand_in()[1].random(), lambda path: stand_in()[2].random()),
     # copies
-    ("Make the function a method that uses `self`; or " + SET_STATE,
-     lambda path: table(Told(of_a_function)), lambda path: table(Told()), lambda path: table(Set(of_a_function))),
+    ("Make it a tuple, if it never changes; or make the function a method that uses `self`; or " + SET_STATE,
+     lambda path: table(FilterObservation(DICT, ["cell"])), lambda path: table(FilterObservation(DICT, ("cell",))),
+     lambda path: told(lambda: table(Told(of_a_function))) and table(Told()), lambda path: table(Set(of_a_function))),
     ("Mend the environment.", lambda path: table(Fails()), lambda path: table(Fails((0, 1)))),
     ("Keep it in one that __init__ or reset makes; make a function that needs it a method that uses `self`.",
      lambda path: table(OfTheModule(of_the_module)), lambda path: table(Told())),

@@ -34,6 +34,7 @@ from irl_gym.sampling import Successors
 from irl_gym.states import StateIndex
 from irl_gym.table_files import load_table, save_table
 from irl_gym.tabular_env import TabularEnv
+from irl_gym.tabular_vec_env import TabularVecEnv
 from irl_gym.tabulate import make, tabulate
 from irl_gym.wrappers import LearnedReward
 
@@ -146,6 +147,13 @@ BLACKJACK = gym.make("Blackjack-v1", sab=True)
 TUPLE = gym.wrappers.TransformObservation(Corridor(), lambda o: (o, o), spaces.Tuple([spaces.Discrete(7)] * 2))
 
 
+PAIRS, ONE = StateIndex(spaces.Tuple([spaces.Discrete(4)] * 2)), np.ones((1, 1))
+
+
+def vectorised(**more):
+    return TabularVecEnv(MDP, LAKE.reward, num_envs=2, **more)
+
+
 def sampled(S_0):
     return FeatureLP(OneHot(16), S_0=S_0).fit(GenerativeModel(lake(), GAMMA), TabularPolicy(POLICY, LAKE.states))
 
@@ -218,6 +226,12 @@ CASES = [
      lambda _: TabularMDP(P[np.where(np.arange(64) == 1, 0, np.arange(64))], GAMMA, MDP.d0)),
     ("Give the probability to states that act.",
      lambda _: Successors(TabularMDP(P, GAMMA, np.eye(16)[15])), lambda _: Successors(TabularMDP(P, GAMMA, np.eye(16)[14]))),
+    ("Normalise the rows.", lambda _: TabularMDP(ONE * (1 + 5e-10), 1 - 1e-10, [1.0]),
+     lambda _: TabularMDP(ONE, 1 - 1e-10, [1.0])),
+    ("Raise it, or `tolerance`.",
+     lambda _: value_iteration(MDP, LAKE.reward, max_iterations=1, sweeps=0),
+     lambda _: value_iteration(MDP, LAKE.reward, sweeps=0),
+     lambda _: value_iteration(MDP, LAKE.reward, max_iterations=1, sweeps=0, tolerance=99.0)),
     # policies
     ("Give one entry for each state.", lambda _: as_distribution(GREEDY[:9], 16, 4), lambda _: as_distribution(GREEDY, 16, 4)),
     ("Turn (S,) actions into them with `irl_gym.policies.as_distribution(actions, S, A)`.",
@@ -231,6 +245,8 @@ CASES = [
     # environments of tables, and Stable-Baselines3
     ("Call reset first.", lambda _: TabularEnv(MDP, LAKE.reward).step(0),
      lambda _: (env := TabularEnv(MDP, LAKE.reward)).reset(seed=0) and env.step(0)),
+    ("Make a new env.", lambda _: vectorised().set_attr("max_episode_steps", 9), lambda _: vectorised(max_episode_steps=9)),
+    ("Use show_rows=True.", lambda _: vectorised(states=PAIRS), lambda _: vectorised(states=PAIRS, show_rows=True)),
     ("Shift them, with `gymnasium.wrappers.TransformAction(env, lambda a: a + 5, gymnasium.spaces.Discrete(2))`.",
      lambda _: check_steppable(Shifted()), lambda _: trainable(coded(check_steppable, Shifted()))),
     ("Flatten them, with `gymnasium.wrappers.FlattenObservation(env)`.",
@@ -247,6 +263,9 @@ CASES = [
     ("Lower the counts, or choose fewer coordinates.",
      lambda _: RadialBasis.grid([0] * 9, [1] * 9, 9),
      lambda _: RadialBasis.grid([0] * 9, [1] * 9, 2), lambda _: RadialBasis.grid([0], [1], 9)),
+    ("Use features of coordinates, such as RadialBasis, or number the observations with a StateIndex.",
+     lambda _: OneHot(16)(np.array([[0, 1]])), lambda _: RadialBasis.grid([0, 0], [3, 3], 4)(np.array([[0, 1]])),
+     lambda _: OneHot(16)(StateIndex(spaces.MultiDiscrete([4, 4])).encode_batch(np.array([[0, 1]])))),
     ("Look at what the map does with that observation.",
      lambda _: mapped(lambda seen: np.where(seen > 0, seen, np.nan)), lambda _: mapped(np.sqrt).size),
     ("Or use a table.", lambda _: sampled(3), lambda _: sampled(np.array([[0.0], [4.0], [8.0]])),
@@ -258,7 +277,7 @@ CASES = [
 FILES = [f"{name}.py" for name in (
     "tabulate tabulation blackjack selfcheck table_files discretize wrappers linear_reward dynamic_programming counting tally "
     "counted_rows mdp policies sampling shaping rewards rollouts tabular_env tabular_vec_env rewarded_vec_env bases features "
-    "feature_sums generative keyboard published_table published_model watching states layouts names told_spaces"
+    "feature_sums generative keyboard published_table published_model watching layouts names told_spaces"
 ).split()]  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from enumeration_envs import Board, Corridor, Shows
-from gymnasium.wrappers import FilterObservation, TimeAwareObservation
+from gymnasium.wrappers import FilterObservation, TimeAwareObservation, TimeLimit
 from mended import GAMMA, done, mends, told, unsaid
 
 import irl_gym
@@ -228,6 +228,23 @@ def stand_in():
     return draws, draws.twin(real), real
 
 
+class Counts(gym.ObservationWrapper):
+    """Shows the steps taken, up to a limit that it knows of, beside the cell."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.steps, self.observation_space = 0, gym.spaces.MultiDiscrete([7, 11])
+
+    def reset(self, **options):
+        self.steps = -1
+        return super().reset(**options)
+
+    def observation(self, observation):
+        self.steps += 1
+        return np.array([observation, self.steps])
+
+
+COUNTED = Counts(TimeLimit(Corridor(), 10))
 DICT = Shows(gym.spaces.Dict({"cell": gym.spaces.Discrete(7)}), lambda cell: {"cell": cell})
 TIMED = TimeAwareObservation(gym.make("FrozenLake-v1", is_slippery=False), flatten=False, normalize_time=False)
 
@@ -287,6 +304,7 @@ CASES = [
      lambda path: table(Breaks()), lambda path: table(BreaksAndIsSet()), lambda path: table(Leaves())),
     ("Give Told get_state() and set_state(state), or a __deepcopy__ that leaves this attribute out.",
      lambda path: table(Told(locked)), lambda path: table(Set(locked)), lambda path: table(Leaves(locked))),
+    ("Leave out what counts on it.", lambda path: table(COUNTED), lambda path: table(COUNTED.env)),
     ("Leave the wrapper out; or learn from episodes alone, with TrajectoryLP.",
      lambda path: table(TIMED), lambda path: table(TIMED.env), lambda path: from_episodes(TIMED)),
 ]  # fmt: skip

@@ -74,10 +74,8 @@ def _(space: spaces.Tuple | spaces.Dict) -> np.ndarray:
 
 
 def _nothing(space: spaces.Space) -> NotDiscrete:
-    return NotDiscrete(
-        f"{space} is empty: expected at least one number. Leave it out, with a wrapper that shows the rest, as "
-        "`gymnasium.wrappers.FilterObservation(env, ('key',))`."
-    )
+    mend = "Leave it out, with a wrapper that shows the rest, as `gymnasium.wrappers.FilterObservation(env, ('key',))`."
+    return NotDiscrete(f"{space} is empty: expected at least one number. {mend}")
 
 
 def _parts(space: spaces.Tuple | spaces.Dict) -> list[spaces.Space]:

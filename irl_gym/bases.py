@@ -75,7 +75,7 @@ class RadialBasis:
                 f"counts is {counts!r}: expected at least one centre along each coordinate, one whole number or {low_.size}."
             )
         each = np.broadcast_to(given, low_.shape)
-        _check_count(prod(each.tolist()))
+        _check_count(prod(each.tolist()), "counts")
         width = checked_number("width", width, "a number of spacings above 0", above=0, error=InvalidFeatures)
         axes = [np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2]) for a, b, n in zip(low_, high_, each, strict=True)]
         spacing = (high_ - low_) / np.maximum(each - 1, 1)
@@ -125,7 +125,7 @@ class Fourier:
         low, _ = _bounds(self.low, self.high)
         _check_callable(self.coordinates)
         _order(self.order)
-        _check_count((int(self.order) + 1) ** min(low.size, 20))  # 2^20 are too many already
+        _check_count((int(self.order) + 1) ** min(low.size, 20), "order")  # 2^20 are too many already
 
     @cached_property
     def frequencies(self) -> np.ndarray:
@@ -172,7 +172,7 @@ class Polynomial:
         low, _ = _bounds(self.low, self.high)
         _check_callable(self.coordinates)
         _order(self.degree)
-        _check_count(comb(low.size + int(self.degree), min(low.size, int(self.degree), 20)))  # of (40 over 20), too
+        _check_count(comb(low.size + int(self.degree), min(low.size, int(self.degree), 20)), "degree")  # of (40 over 20), too
 
     @cached_property
     def exponents(self) -> np.ndarray:
@@ -234,10 +234,10 @@ def _check_callable(coordinates: Any) -> None:
         raise InvalidFeatures(f"coordinates is {coordinates!r:.80}: expected a function of observations, or None.")
 
 
-def _check_count(count: int) -> None:
+def _check_count(count: int, by: str) -> None:
     if count > MOST:
         raise InvalidFeatures(
-            f"there are more than {MOST:,} features: expected at most as many. Lower the order, or choose fewer coordinates."
+            f"there are more than {MOST:,} features: expected at most as many. Lower the {by}, or choose fewer coordinates."
         )
 
 

@@ -62,8 +62,8 @@ def blackjack_table(env: gym.Env, gamma: float) -> Tabulation | None:
     if rules.tell_naturals and not shown:
         raise NotTabular(
             f"Blackjack with {rules}: the hands (ace, 10), a natural, and (ace, 2, 8) are one observation, such as "
-            "(21, 10, 1), and sticking pays them differently: expected an observation that shows which it is. Wrap it: "
-            "`Reveal(env)` of irl_gym.reveal."
+            "(21, 10, 1), and sticking pays them differently: expected an observation that shows which it is. Wrap it, "
+            "as in `irl_gym.reveal.Reveal(env)`."
         )
     cards = {card: Fraction(count, len(blackjack.deck)) for card, count in Counter(blackjack.deck).items()}
     return _assemble(_Game(cards, rules, shown), env.observation_space, gamma)

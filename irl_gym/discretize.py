@@ -89,15 +89,15 @@ def discretize(
     checked_number("memory_limit", memory_limit, "a number of bytes above 0, such as 4e9", above=0)
     if isinstance(env.unwrapped, TabularEnv):
         raise InvalidParameter(
-            f"{type(env.unwrapped).__name__} is a table: expected an environment that is none. Use tabulate."
+            f"{type(env.unwrapped).__name__} is a table: expected an environment that is none. Use `tabulate(env, gamma=...)`."
         )
     physics = physics_of(env, bounds=bounds)
     cells = Cells(physics.coordinates, bins)
     if isinstance(physics.coordinates, IntegerCoordinate) and (cells.widths != 1).any():
         whole = round(float((physics.coordinates.high - physics.coordinates.low)[0]))
         raise InvalidParameter(
-            f"bins is {bins!r}, but the states are {whole} whole numbers: expected {whole} cells, or some would share one. Use "
-            "tabulate where the environment publishes its table."
+            f"bins is {bins!r}, but the states are {whole} whole numbers: expected {whole} cells, or some would share one. "
+            f"Give bins={whole}, or use `tabulate(env, gamma=...)`, which needs none."
         )
     _check_size(cells, physics.n_actions, successors, samples, memory_limit)
     world = _World(physics, cells, successors, int(samples), int(seed))

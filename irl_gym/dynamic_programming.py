@@ -151,7 +151,8 @@ def value_iteration(
         if sweeps:
             V = sweeps_of(mdp, R, V, Q.argmax(axis=1), sweeps)
     raise InvalidParameter(
-        f"max_iterations is {max_iterations}: V is within {error:.2e} of V*, not {3 / 8 * tolerance:.2e}, as the policy needs."
+        f"max_iterations is {max_iterations}: V is within {error:.2e} of V*, not {3 / 8 * tolerance:.2e}, as the policy needs. "
+        "Raise it, or `tolerance`."
     )
 
 

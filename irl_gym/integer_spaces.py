@@ -22,11 +22,11 @@ def ranges(space: spaces.Space) -> np.ndarray:
     Raises:
         NotDiscrete: a part that is not made of integers, is empty, or has more values than 64 bits can number.
     """
-    mend = "Discretise the environment first."
+    mend = "Show the same as one of these, with `gymnasium.wrappers.TransformObservation`."
     if type(space).__name__ == "MissionSpace":
         mend = "MiniGrid's environments have their whole state as integers in `irl_gym_envs:irl_gym/MiniGrid-v0`."
     elif isinstance(space, spaces.Text):
-        mend = "Leave text out, with a wrapper that shows the rest."
+        mend = "Leave text out, with a wrapper that shows the rest, as `gymnasium.wrappers.FilterObservation(env, ('key',))`."
     raise NotDiscrete(
         f"{space} is not made of integers: expected Discrete, MultiDiscrete, MultiBinary, an integer Box, or a Tuple or "
         f"Dict of these. {mend}"
@@ -50,14 +50,14 @@ def _(space: spaces.MultiBinary) -> np.ndarray:
 
 @ranges.register
 def _(space: spaces.Box) -> np.ndarray:
+    if not space.low.size:
+        raise _nothing(space)
     if space.dtype.kind not in "iub":
         raise NotDiscrete(
             f"{space} holds floats: expected integers. Discretise the environment first, with `discretize(env, gamma=..., "
             "bins=...)` if its state can be set."
         )
     low, high = space.low.ravel(), space.high.ravel()
-    if not low.size:
-        raise _nothing(space)
     # As 64-bit integers the bounds of an unsigned Box, or the count, would wrap around.
     if (high.astype(float) - low.astype(float)).max() > 2**62 or int(high.max()) >= 2**63:
         raise NotDiscrete(f"{space} has more than 2^62 elements, or larger ones: too many to number. Give it narrower bounds.")
@@ -74,7 +74,8 @@ def _(space: spaces.Tuple | spaces.Dict) -> np.ndarray:
 
 
 def _nothing(space: spaces.Space) -> NotDiscrete:
-    return NotDiscrete(f"{space} is empty: expected at least one number. Leave it out, with a wrapper that shows the rest.")
+    mend = "Leave it out, with a wrapper that shows the rest, as `gymnasium.wrappers.FilterObservation(env, ('key',))`."
+    return NotDiscrete(f"{space} is empty: expected at least one number. {mend}")
 
 
 def _parts(space: spaces.Tuple | spaces.Dict) -> list[spaces.Space]:

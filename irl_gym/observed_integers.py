@@ -68,7 +68,7 @@ def _integers(space: spaces.Space, seen: list[Any], name: str, place: str) -> tu
     if isinstance(space, spaces.Text):
         words = sorted({str(one) for one in seen})
         return (f"{words}.index({name})", f"gymnasium.spaces.Discrete({len(words)})") if len(words) <= MOST_WORDS else None
-    if not isinstance(space, spaces.Box):
+    if not isinstance(space, spaces.Box) or not space.low.size:
         return (name, place) if isinstance(space, spaces.Discrete | spaces.MultiDiscrete | spaces.MultiBinary) else None
     if space.dtype.kind in "iub":
         return name, place

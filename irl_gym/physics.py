@@ -231,9 +231,9 @@ def _copy_of(env: gym.Env) -> Any:
     try:
         walker = copy.deepcopy(env)
     except (TypeError, AttributeError, ValueError) as error:
+        mend = "Give it a __deepcopy__ that leaves this out." if env.render_mode is None else "Make it without a render mode."
         raise NotSettable(
-            f"{type(env).__name__} cannot be copied ({error}): expected an environment that copy.deepcopy takes. Make it "
-            "without a render mode."
+            f"{type(env).__name__} cannot be copied ({error}): expected an environment that copy.deepcopy takes. {mend}"
         ) from error
     if getattr(walker, "render_mode", None) is not None:
         walker.render_mode = None

@@ -35,10 +35,14 @@ def check_steppable(env: gym.Env) -> None:
     """
     actions = env.action_space
     if isinstance(actions, spaces.Discrete) and actions.start != 0:
-        raise InvalidParameter(f"the actions are {actions}: expected numbers from 0, as Stable-Baselines3 gives. Shift them.")
+        raise InvalidParameter(
+            f"the actions are {actions}: expected numbers from 0, as Stable-Baselines3 gives. Shift them, with "
+            f"`gymnasium.wrappers.TransformAction(env, lambda a: a + {actions.start}, gymnasium.spaces.Discrete({actions.n}))`."
+        )
     if isinstance(env.observation_space, spaces.Tuple):
         raise InvalidParameter(
-            f"the observations are {env.observation_space}: Stable-Baselines3 takes no Tuple. Flatten them with a wrapper."
+            f"the observations are {env.observation_space}: expected others than a Tuple, which Stable-Baselines3 does not "
+            "take. Flatten them, with `gymnasium.wrappers.FlattenObservation(env)`."
         )
 
 

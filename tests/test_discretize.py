@@ -243,5 +243,5 @@ def test_discretize_refuses_worlds_that_hide_their_state():
 
 
 def test_discretize_refuses_tables():
-    with pytest.raises(InvalidParameter, match="Use tabulate"):
+    with pytest.raises(InvalidParameter, match="Use `tabulate"):
         discretize(gym.make("irl_gym_envs:irl_gym/GridWorld-v0"), gamma=0.9, bins=25)

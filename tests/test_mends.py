@@ -175,28 +175,6 @@ def test_an_environment_that_makes_new_generators_is_counted():
     assert done(mends(error_of(env, NotTabular))[0], env).mdp.n_states == 7
 
 
-class Crowded(Corridor):
-    """Each reset draws one of very many first observations."""
-
-    def __init__(self):
-        super().__init__()
-        self.observation_space = spaces.Discrete(10**9)
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        self.cell = int(self.np_random.integers(10**9))
-        return self.cell, {}
-
-    def step(self, action):
-        return self.cell, 0.0, bool(action), False, {}
-
-
-def test_resets_that_cannot_be_listed_are_fixed():
-    env = Crowded()
-    message = error_of(env, NotTabular, by=Enumeration(start_runs=300))
-    assert tabulate(done(mends(message)[0], env), gamma=GAMMA).mdp.n_states == 2
-
-
 def test_a_value_that_a_constructor_does_not_know_is_told_with_those_it_knows():
     with pytest.raises(InvalidParameter, match=r"map_name is '9x9', which FrozenLake-v1 does not know: expected") as caught:
         make("FrozenLake-v1", map_name="9x9")

@@ -122,7 +122,7 @@ def test_state_index_survives_pickle():
     ],
 )
 def test_state_index_refuses_a_space_that_is_not_made_of_integers(space):
-    with pytest.raises(NotDiscrete, match=r"Discretise the environment first|Leave text out"):
+    with pytest.raises(NotDiscrete, match=r"Discretise the environment first|Leave text out|Show the same"):
         StateIndex(space)
 
 

@@ -6,7 +6,6 @@ the original's in the copy too: what is written through it is never read from th
 
 import enum
 import gc
-import sys
 import types
 import weakref
 from collections.abc import Iterable, Iterator
@@ -50,19 +49,54 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
 
 
 def held_outside(layers: list[gym.Env]) -> list[tuple[str, Any]]:
-    """Class attributes and globals that methods name, but for `__init__`, and of which the layers hold a part: names, values.
+    """Class attributes and globals that code of the layers names, and of which they hold a part: names, values.
 
-    A deep copy of `self.board = BOARD` parts the two. So they are not copied, and have to stay as they are.
+    A deep copy of `self.board = BOARD` parts the two. So they are not copied, and have to stay as they are. The code is that of
+    methods, but for `__init__`, of functions that the layers hold, and of functions of their modules that these name.
     """
-    found = {}
-    for kind in dict.fromkeys(kind for layer in layers for kind in type(layer).__mro__):
-        methods = [getattr(one, "__func__", one) for name, one in vars(kind).items() if name != "__init__"]
-        names = {name for one in methods if isinstance(one, types.FunctionType) for name in one.__code__.co_names}
-        for where, values in ((kind.__module__, vars(sys.modules.get(kind.__module__, kind))), (kind.__name__, vars(kind))):
-            for name in names & values.keys():
+    reached = [*_reached(layers)]
+    kinds = dict.fromkeys(kind for layer in layers for kind in type(layer).__mro__)
+    methods = [
+        one for kind in kinds for name, method in vars(kind).items() if name != "__init__" for one in _functions_in(method)
+    ]
+    functions = _with_named([*methods, *(one for _, one in reached if isinstance(one, types.FunctionType))])
+    spoken = {name for names in functions.values() for name in names}
+    places = [(one.__module__, one.__globals__, names) for one, names in functions.items()]
+    places += [(kind.__name__, vars(kind), spoken) for kind in kinds]
+    found: dict[int, tuple[str, Any]] = {}
+    for where, values, names in places:
+        for name in names & values.keys():
+            if id(values[name]) not in found:
                 found |= dict.fromkeys(map(id, inside(values[name])), (f"{where}.{name}", values[name]))
-    parts = [found[id(one)] for _, one in _reached(layers) if id(one) in found] if found else []
+    parts = [found[id(one)] for _, one in reached if id(one) in found] if found else []
     return list({id(value): (name, value) for name, value in parts}.values())
+
+
+def _functions_in(method: Any) -> Iterator[types.FunctionType]:
+    """The functions of an attribute of a class: itself, or what a property or a static method is made of."""
+    for one in (method, *(getattr(method, name, None) for name in ("__func__", "fget", "fset", "func"))):
+        if isinstance(one, types.FunctionType):
+            yield one
+
+
+def _with_named(functions: Iterable[types.FunctionType]) -> dict[types.FunctionType, set[str]]:
+    """Functions, and those of their own modules that they name, with the names in the code of each."""
+    found: dict[types.FunctionType, set[str]] = {}
+    waiting = list(functions)
+    while waiting:
+        one = waiting.pop()
+        if one not in found:
+            found[one] = _names(one.__code__)
+            named = (one.__globals__.get(name) for name in found[one])
+            waiting += [
+                other for other in named if isinstance(other, types.FunctionType) and other.__module__ == one.__module__
+            ]
+    return found
+
+
+def _names(code: types.CodeType) -> set[str]:
+    """The names in code and in the functions that it makes."""
+    return {*code.co_names}.union(*(_names(one) for one in code.co_consts if isinstance(one, types.CodeType)))
 
 
 def inside(value: Any) -> list[Any]:
@@ -77,9 +111,10 @@ def inside(value: Any) -> list[Any]:
 
 
 def _leads_back(name: str, one: Any) -> NotCopied:
+    mend = "Make it a tuple, if it never changes; or make" if isinstance(one, list) else "Make"
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "
-        "variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
+        f"variable or a weak reference, which copies share: expected all that changes in attributes alone. {mend} the "
         "function a method that uses `self`; or give the environment get_state() and set_state(state)."
     )
 

@@ -233,7 +233,7 @@ class Snapshots:
                 return _Copy(held), []  # a handle of the environment's own, which only set_state understands
             raise NotTabular(
                 f"the inner state can neither be pickled nor copied ({error}): expected attributes that copy.deepcopy copies. "
-                "Give the environment get_state() and set_state(state)."
+                "Make it in __init__ or reset, and give the environment get_state() and set_state(state)."
             ) from error
         return _Copy(made), memories
 

@@ -135,6 +135,10 @@ def sets_a_variable(env):
 BOARD = [0]
 
 
+def board():
+    return BOARD
+
+
 class WithBoard(Line):
     board = [0]  # noqa: RUF012
 
@@ -142,13 +146,44 @@ class WithBoard(Line):
         return BOARD[0] + self.board[0]
 
 
+class OfProperty(Line):
+    cell = property(lambda self: BOARD[0])
+
+    def see(self):
+        return self.cell
+
+
+class Boarded(Line):
+    board = [0]  # noqa: RUF012
+
+
+class OfBase(Boarded):
+    def see(self):
+        return self.board[0]
+
+
+class OfFunction(Line):
+    def see(self):
+        return sum(one for one in board())
+
+
+class OfComprehension(Line):
+    def see(self):
+        return sum(BOARD[i] for i in range(1))
+
+
 def of_the_module(env):
     env.mine = BOARD
     env.put = types.MethodType(lambda self, place: self.mine.__setitem__(0, place), env)
 
 
+def of_a_function_that_is_held(env):
+    of_the_module(env)
+    env.see = types.MethodType(lambda self: BOARD[0], env)
+
+
 def of_the_class(env):
-    env.mine = [WithBoard.board]
+    env.mine = [type(env).board]
     env.put = types.MethodType(lambda self, place: self.mine[0].__setitem__(0, place), env)
 
 
@@ -181,13 +216,18 @@ REFUSED = {
     "a variable that is set": (Line, sets_a_variable, "changes what the function .*put holds .at., which all copies share"),
     "a module's": (WithBoard, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
     "a class's": (WithBoard, of_the_class, "changes WithBoard.board, which all copies share"),
+    "a base class's": (OfBase, of_the_class, "changes Boarded.board, which all copies share"),
+    "a module's, of a property": (OfProperty, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
+    "a module's, of a function": (OfFunction, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
+    "a module's, of a comprehension": (OfComprehension, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
+    "a module's, of what is held": (Line, of_a_function_that_is_held, "changes .*test_apart.BOARD, which all copies share"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_copies_share_is_refused_where_it_changes(name):
     kind, give, what = REFUSED[name]
-    BOARD[0] = WithBoard.board[0] = 0
+    BOARD[0] = WithBoard.board[0] = Boarded.board[0] = 0
     with pytest.raises(NotTabular, match=what):
         Enumeration().table(kind(give), 0.9)
 

@@ -38,7 +38,7 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
         if id(one) in anew or (memo.get(id(one), one) is not one and not isinstance(one, _FIXED)):
             raise _leads_back(name, one)
     memories, dictionaries = [], set[int]()
-    owners = {id(vars(layer)): ("", layer) for layer in copied}
+    owners: dict[int, tuple[str, Any]] = {id(vars(layer)): ("", layer) for layer in copied}
     for name, one in _reached(copied):
         if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
             raise _leads_back(name, one)

@@ -104,8 +104,10 @@ class Run:
             again += ("values, scores and agreement", "the worst tie", "distances between rewards", "the size of the table")
         if not again:
             return "Everything is the run's own record."
-        of = ", and among it the value of its expert's episodes" if self.config.get("dataset") is not None else ""
-        return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{of}."
+        of = ("the value of its expert's episodes",) if self.config.get("dataset") is not None else ()
+        of += ("values by episodes",) if any("sampled_value" in row for row in self.metrics["policies"].values()) else ()
+        among = f", and among it {' and '.join(of)}" if of else ""
+        return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.

@@ -74,6 +74,12 @@ def test_a_learner_that_judges_by_episodes_has_the_word_of_the_table_beside_its_
     assert ("Judged on the table", found["on_table"]) in certificate(told).shown["lines"]
 
 
+def test_values_by_episodes_are_said_to_be_the_record_s(run):
+    policies = {**run.metrics["policies"], "expert": run.metrics["policies"]["expert"] | {"sampled_value": 1.0}}
+    told = replace(run, metrics={**run.metrics, "policies": policies})
+    assert told.whose == run.whose.removesuffix(".") + ", and among it values by episodes."
+
+
 # --- digests that were made anew ---
 
 

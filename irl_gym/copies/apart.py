@@ -36,12 +36,19 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
     for name, one in _reached(made):
         if id(one) in anew or (memo.get(id(one), one) is not one and not isinstance(one, _FIXED)):
             raise _leads_back(name, one)
-    memories = []
+    memories, dictionaries = [], set[int]()
+    owners: dict[int, tuple[str, Any]] = {id(vars(layer)): ("", layer) for layer in copied}
     for name, one in _reached(copied):
-        if type(one) in weakref.ProxyTypes:
+        if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
             raise _leads_back(name, one)
         if holds_memory(type(one)):
             memories.append(one)
+        if isinstance(one, dict):
+            dictionaries.add(id(one))
+        if (own := _own_dictionary(one)) is not None and owners.setdefault(id(own), (name, one))[1] is not one:
+            raise _two_ways(name, one)
+    for twice in owners.keys() & dictionaries:
+        raise _two_ways(*owners[twice])
     for apart in (one for one in memories if id(one) not in memo):
         for one in memories:
             if one is not apart and overlap(extent(one), extent(apart)):
@@ -119,6 +126,26 @@ def _leads_back(name: str, one: Any) -> NotCopied:
     )
 
 
+def _two_ways(name: str, one: Any) -> NotCopied:
+    return NotCopied(
+        f"{name or type(one).__name__} leads to a {type(one).__name__} whose __dict__ is held in another way too, by which its "
+        "attributes could change, and in copies could not: expected that it alone holds it. Hold the object, and write "
+        "vars(...) of it where that is needed; give a dictionary a __getattr__ in the place of `self.__dict__ = self`; or "
+        "give the environment get_state() and set_state(state)."
+    )
+
+
+def _attaching() -> tuple[type, ...]:
+    """Types whose copies are of the same memory."""
+    module: Any = sys.modules.get("multiprocessing.shared_memory")  # whoever holds one has imported it
+    return (module.SharedMemory,) if module is not None else ()
+
+
+def _own_dictionary(one: Any) -> Any:
+    """The `__dict__` of an object that has one of its own; None of code, and where there is none."""
+    return vars(one) if type(one).__dictoffset__ and not isinstance(one, (*CODE, *_DESCRIBED)) else None
+
+
 def _reached(layers: list[gym.Env]) -> Iterator[tuple[str, Any]]:
     """Every object that layers hold, but code and what describes them, and the attribute that leads there."""
     seen = {id(layer) for layer in layers}
@@ -151,4 +178,7 @@ def _referents(one: Any) -> Iterable[Any]:
         return [one()]
     if isinstance(one, np.ndarray):
         return [*one.flat] if one.dtype == object else ()
-    return gc.get_referents(one)
+    own = _own_dictionary(one)
+    return (
+        gc.get_referents(one) if own is None else [*(part for part in gc.get_referents(one) if part is not own), *own.values()]
+    )

@@ -24,11 +24,12 @@ from irl_gym.copies.replacing import held_by
 from irl_gym.errors import NotEnumerable, NotTabular
 
 Look = Callable[[Any], Any]
-_LEAVES = (*GENERATORS, gym.Space, type, types.ModuleType, np.ufunc, np.generic, np.dtype, enum.Enum, range)
+_NUMBERS = (np.number, np.bool_, np.character, np.datetime64)  # a row of a structured array can be written to
+_LEAVES = (*GENERATORS, gym.Space, type, types.ModuleType, np.ufunc, *_NUMBERS, np.dtype, enum.Enum, range)
 _MARSHALLED = frozenset({dict, list, tuple, set, frozenset})
 MANY = 300
 """Containers inside above which plain ones are compared by what `marshal` writes of all of them, which is faster then."""
-_CONTAINERS = (np.ndarray, bytearray, array.array, dict, list, deque, set, tuple, frozenset, types.FunctionType)
+_CONTAINERS = (np.ndarray, np.void, bytearray, array.array, dict, list, deque, set, tuple, frozenset, types.FunctionType)
 
 
 class Contents:
@@ -77,6 +78,8 @@ def _looks(one: Any, references: References) -> Iterator[Look]:
         yield from (_form, _elements if one.dtype == object else np.ndarray.tobytes)
     elif isinstance(one, bytearray | array.array):
         yield bytes
+    elif isinstance(one, np.void):
+        yield np.void.tobytes
     elif isinstance(one, dict):
         yield from (list, _values)
     elif isinstance(one, list | deque):

@@ -48,6 +48,7 @@ class References:
         """What held memory in the last value that was pickled, arrays above all; but for what is referred to."""
 
         methods = {**copyreg.dispatch_table, types.MethodType: lambda one: (types.MethodType, (one.__func__, one.__self__))}
+        methods |= dict.fromkeys((np.void, np.record), lambda one: (np.ndarray.__getitem__, (np.array(one).copy(), ())))
         own = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
         self.functions: list[types.FunctionType] = []
         """Functions that were met and that hold objects, none of which is in a pickle."""

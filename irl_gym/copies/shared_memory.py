@@ -57,7 +57,7 @@ def placed(
 def holds_memory(kind: type) -> bool:
     """Are objects of this type memory that another object may share?"""
     torch: Any = sys.modules.get("torch")  # whoever holds a tensor has imported it
-    return issubclass(kind, (np.ndarray, *_BUFFERS)) or (torch is not None and issubclass(kind, torch.Tensor))
+    return issubclass(kind, (np.ndarray, np.void, *_BUFFERS)) or (torch is not None and issubclass(kind, torch.Tensor))
 
 
 def extent(one: Any) -> Extent:
@@ -65,7 +65,7 @@ def extent(one: Any) -> Extent:
     if isinstance(one, np.ndarray):
         low, high = byte_bounds(one) if one.size else (0, 0)
         return int(low), int(high)
-    if isinstance(one, _BUFFERS):
+    if isinstance(one, (np.void, *_BUFFERS)):
         return extent(np.frombuffer(one, np.uint8)) if memoryview(one).nbytes else (0, 0)
     storage = one.untyped_storage() if one.layout == sys.modules["torch"].strided else None
     return (0, 0) if storage is None else (storage.data_ptr(), storage.data_ptr() + storage.nbytes())
@@ -122,8 +122,8 @@ def _told(one: Any) -> str:
     return f"a {type(one).__module__}.{type(one).__name__}" + (f" of shape {tuple(shape)}" if shape is not None else "")
 
 
-def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T, list[Any]]:
-    """A deep copy whose arrays share memory where the originals do, and the originals that hold memory.
+def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T, list[Any], dict[int, Any]]:
+    """A deep copy whose arrays share memory where the originals do, the originals that hold memory, and the memo afterwards.
 
     Args:
         make: copies by `copy.deepcopy`, with the memo that it is given; called again where arrays share memory.
@@ -136,7 +136,7 @@ def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T
     made, met = make(told), [*_met(told)]
     found = blocks(met)
     if not found:
-        return made, met
+        return made, met, told
     told = dict(memo)
     fresh = [block.memory.copy() for block in found]
     for block, memory in zip(found, fresh, strict=True):
@@ -148,7 +148,7 @@ def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T
         for one in _met(told):
             if overlap(extent(one), block.extent):
                 raise shared(one, block.arrays[0])
-    return made, met
+    return made, met, told
 
 
 def _met(memo: Any) -> Iterator[Any]:

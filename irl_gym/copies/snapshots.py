@@ -225,7 +225,7 @@ class Snapshots:
     def _copied(self, held: Any) -> tuple["_Copy", list[Any]]:
         """A deep copy as a state, and what holds memory in it."""
         try:
-            made, memories = copied(lambda memo: copy.deepcopy(held, memo), self._references.memo())
+            made, memories, _ = copied(lambda memo: copy.deepcopy(held, memo), self._references.memo())
         except NotCopied:
             raise
         except REFUSALS as error:

@@ -67,16 +67,16 @@ def looked_through(layer: gym.Env) -> bool:
 def _copied(kept: list[gym.Env], chain: list[gym.Env]) -> gym.Env:
     """Copies of the kept layers, with arrays that share memory where the originals do."""
     try:
-        return copied(lambda memo: _apart(kept, chain, memo), {})[0]
+        return _apart(kept, chain, {})
     except NotCopied:
         if not settable(chain[-1]):
             raise
-        return copied(lambda memo: _apart(kept, chain, memo), {id(chain[-1]): chain[-1]})[0]
+        return _apart(kept, chain, {id(chain[-1]): chain[-1]})
 
 
 def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> gym.Env:
-    memo |= {id(one): one for _, value in held_outside(kept) for one in inside(value)}
-    made = _layers_copied(kept, chain, memo)
+    known = memo | {id(one): one for _, value in held_outside(kept) for one in inside(value)}
+    made, _, memo = copied(lambda told: _layers_copied(kept, chain, told), known)
     if made.unwrapped is not chain[-1]:  # else it speaks for itself
         cells = renew_functions(made, {id(layer): memo[id(layer)] for layer in chain})
         check_apart(layers(made), kept, memo, cells)

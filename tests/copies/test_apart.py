@@ -4,6 +4,7 @@ import logging
 import threading
 import types
 import weakref
+from multiprocessing.shared_memory import SharedMemory
 
 import gymnasium as gym
 import numpy as np
@@ -132,6 +133,34 @@ def sets_a_variable(env):
     env.put, env.see = put, lambda: at
 
 
+class Attributes(dict):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.__dict__ = self
+
+
+def a_dictionary_of_its_own_attributes(env):
+    env.one = Attributes(at=0)
+    through(lambda self, place: setattr(self.one, "at", place), lambda self: self.one["at"])(env)
+
+
+def its_own_attributes(env):
+    env.mine = vars(env)
+    env.put = types.MethodType(lambda self, place: self.mine.__setitem__("at", place), env)
+
+
+def attributes_of_two(env):
+    env.one, env.other = One(), One()
+    env.other.__dict__ = env.one.__dict__
+    through(lambda self, place: setattr(self.one, "at", place), lambda self: self.other.at)(env)
+
+
+def shared_memory(env):
+    env.memory = SharedMemory(create=True, size=8)
+    weakref.finalize(env, env.memory.unlink)
+    through(lambda self, place: self.memory.buf.__setitem__(0, place), lambda self: self.memory.buf[0])(env)
+
+
 BOARD = [0]
 
 
@@ -214,6 +243,10 @@ REFUSED = {
     "a weak dict": (Line, weakly(lambda one: weakref.WeakValueDictionary({0: one}), lambda held: held[0]), "leads to a One"),
     "a view that copies itself": (Line, a_view_that_copies_itself, "share memory"),
     "a variable that is set": (Line, sets_a_variable, "changes what the function .*put holds .at., which all copies share"),
+    "its own attributes": (Line, its_own_attributes, "whose __dict__ is held in another way too"),
+    "a dictionary of its own attributes": (Line, a_dictionary_of_its_own_attributes, "Line.one leads to a Attributes whose"),
+    "attributes of two objects": (Line, attributes_of_two, "leads to a One whose __dict__ is held in another way too"),
+    "memory that processes share": (Line, shared_memory, "Line.memory leads to a SharedMemory"),
     "a module's": (WithBoard, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
     "a class's": (WithBoard, of_the_class, "changes WithBoard.board, which all copies share"),
     "a base class's": (OfBase, of_the_class, "changes Boarded.board, which all copies share"),

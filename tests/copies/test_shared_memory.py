@@ -52,6 +52,10 @@ SHARED = {
     "a part run backwards": lambda: Line(pair(np.zeros((4, 3)).T, lambda b: b[::-1, 1:]), put(1, (0, 0)), lambda h: h[0][2, 1]),
     "a field": lambda: Line(pair(np.zeros(3, "i4, f8"), lambda b: b["f0"]), put(1, 1), lambda held: held[0][1]["f0"]),
     "objects": lambda: Line(pair(np.full((3, 4), 0, object), lambda b: b[1]), put(1, 2), lambda held: held[0][1, 2]),
+    "objects that hold": lambda: Line(
+        pair(np.array([[0], None], object), lambda b: b[:1], lambda b: b[0]), put(2, 0), lambda held: held[1][0][0]
+    ),
+    "rows of a structured array": lambda: Line([*np.zeros(3, "i4, f8")], put(1, "f0"), lambda held: held[1]["f0"]),
     "a row of a large one": lambda: Line(pair(np.zeros((40, 40)), lambda b: b[1]), put(1, 2), lambda held: held[0][1, 2]),
     "what cannot be pickled": lambda: Line([*pair(np.zeros(3), lambda b: b[1:]), Stubborn()], put(1, 0), lambda h: h[0][1]),
     "a sparse matrix's": lambda: Line(
@@ -80,6 +84,9 @@ REFUSED = {
     "a bytearray": lambda: over(bytearray(4)),
     "an array.array": lambda: over(array.array("B", [0] * 4)),
     "tensors": tensors,
+    "a row of a structured array": lambda: Line(
+        pair(np.zeros(3, "i4, f8"), lambda b: b[1]), put(1, "f0"), lambda h: h[0][1][0]
+    ),
     "a masked array": lambda: Line(pair(np.zeros(3), np.ma.asarray), put(1, 1), lambda held: held[0][1]),
 }
 

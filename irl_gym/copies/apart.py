@@ -101,9 +101,9 @@ def _reached(layers: list[gym.Env]) -> Iterator[tuple[str, Any]]:
             waiting += [(name, part) for part in _referents(one)]
 
 
-_FIXED = (*CODE, tuple, frozenset, np.generic, types.CodeType)
+_FIXED = (*CODE, tuple, frozenset, np.generic, np.dtype, types.CodeType)
 _DESCRIBED = (property, staticmethod, classmethod, types.MethodType, types.BuiltinMethodType)
-_OWN = (*_FIXED, *_DESCRIBED, gym.Space, gym.Env, *GENERATORS, enum.Enum, np.dtype)
+_OWN = (*_FIXED, *_DESCRIBED, gym.Space, gym.Env, *GENERATORS, enum.Enum)
 """What is code, has no contents that change, or is looked after elsewhere."""
 
 

@@ -42,11 +42,11 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
         if type(one) in weakref.ProxyTypes:
             raise _leads_back(name, one)
         if holds_memory(type(one)):
-            memories.append(one)
-    for apart in (one for one in memories if id(one) not in memo):
-        for one in memories:
+            memories.append((name, one))
+    for where, apart in (pair for pair in memories if id(pair[1]) not in memo):
+        for name, one in memories:
             if one is not apart and overlap(extent(one), extent(apart)):
-                raise shared(one, apart)
+                raise shared(one, apart, f" in {name}", f" in {where}")
 
 
 def held_outside(layers: list[gym.Env]) -> list[tuple[str, Any]]:

@@ -57,8 +57,8 @@ class Limited:
                 raise self.deadline.late() from reason
             code = None if self._process is None else self._process.wait()
             raise SolverFailed(
-                f"the process that solves within time_limit ended with {code}: expected an answer. Is there enough memory? "
-                "Leave time_limit out, and no process is started."
+                f"the process that solves within {self.deadline.seconds:g} s ended with {code}: expected an answer. Is there "
+                "enough memory? Without time_limit the first solver works in this process, and is not ended."
             ) from reason
         if error is not None:
             raise getattr(builtins, error)(answer)

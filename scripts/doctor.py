@@ -24,7 +24,10 @@ from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
 from irl_gym.terminal import harmless, print_error
 
-WHOSE = "What only the learner knew, as lambda_0 and what its solver said, is the run's own record; all else is computed now."
+WHOSE = (
+    "What only the learner knew, as lambda_0 and what its solver said, and what episodes showed is the run's own record; "
+    "all else is computed now."
+)
 
 
 @dataclass(frozen=True)

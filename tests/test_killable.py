@@ -92,7 +92,10 @@ def test_an_error_in_a_child_is_the_caller_s():
 
 
 def test_a_child_that_died_is_told_from_one_that_was_late():
-    with within(Deadline.after(60.0)), pytest.raises(SolverFailed, match=r"ended with 3.*Leave time_limit out"):
+    with (
+        within(Deadline.after(60.0)),
+        pytest.raises(SolverFailed, match=r"within 60 s ended with 3.*Without time_limit the first solver works in this"),
+    ):
         called(LONG, os._exit, 3)
 
 
@@ -122,7 +125,15 @@ def test_a_child_ends_with_its_parent_in_a_script_without_a_guard(how):
         parent.send_signal(how)
         assert parent.wait(60) != 0
     for _ in range(600):
-        if not os.path.exists(f"/proc/{child}") or Path(f"/proc/{child}/stat").read_text().split()[2] == "Z":
+        if _ended(child):
             return
         time.sleep(0.1)
     raise AssertionError(f"process {child} outlived its parent")
+
+
+def _ended(child):
+    """Is the process gone, or a zombie that nobody waits for?"""
+    try:
+        return Path(f"/proc/{child}/stat").read_text().split()[2] == "Z"
+    except OSError:  # it may go while it is looked at
+        return True

@@ -138,7 +138,8 @@ def test_what_was_edited_is_refused_by_who_reads_and_who_continues_and_the_mend_
 
 
 def test_an_agent_that_was_swapped_is_named_and_made_again(copied, run):
-    np.savez(copied / "agent_policy.npz", actions=np.where(run.metrics["policies"]["retrained"]["value"], 0, run.expert))
+    other = 0 if run.metrics["policies"]["retrained"]["value"] else run.expert  # of another value
+    np.savez(copied / "agent_policy.npz", actions=np.zeros_like(run.expert) + other)
     with pytest.raises(RunIncomplete, match=r"as agent_policy\.npz gives it; delete agent_policy\.npz and metrics\.json, and"):
         read_run(with_digests_anew(copied))
     for name in ("agent_policy.npz", "metrics.json"):

@@ -6,6 +6,7 @@ the original's in the copy too: what is written through it is never read from th
 
 import enum
 import gc
+import sys
 import types
 import weakref
 from collections.abc import Iterable, Iterator
@@ -42,17 +43,17 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
         if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
             raise _leads_back(name, one)
         if holds_memory(type(one)):
-            memories.append(one)
+            memories.append((name, one))
         if isinstance(one, dict):
             dictionaries.add(id(one))
         if (own := _own_dictionary(one)) is not None and owners.setdefault(id(own), (name, one))[1] is not one:
             raise _two_ways(name, one)
     for twice in owners.keys() & dictionaries:
         raise _two_ways(*owners[twice])
-    for apart in (one for one in memories if id(one) not in memo):
-        for one in memories:
+    for where, apart in (pair for pair in memories if id(pair[1]) not in memo):
+        for name, one in memories:
             if one is not apart and overlap(extent(one), extent(apart)):
-                raise shared(one, apart)
+                raise shared(one, apart, f" in {name}", f" in {where}")
 
 
 def held_outside(layers: list[gym.Env]) -> list[tuple[str, Any]]:
@@ -163,9 +164,9 @@ def _reached(layers: list[gym.Env]) -> Iterator[tuple[str, Any]]:
             waiting += [(name, part) for part in _referents(one)]
 
 
-_FIXED = (*CODE, tuple, frozenset, np.generic, types.CodeType)
+_FIXED = (*CODE, tuple, frozenset, np.generic, np.dtype, types.CodeType)
 _DESCRIBED = (property, staticmethod, classmethod, types.MethodType, types.BuiltinMethodType)
-_OWN = (*_FIXED, *_DESCRIBED, gym.Space, gym.Env, *GENERATORS, enum.Enum, np.dtype)
+_OWN = (*_FIXED, *_DESCRIBED, gym.Space, gym.Env, *GENERATORS, enum.Enum)
 """What is code, has no contents that change, or is looked after elsewhere."""
 
 

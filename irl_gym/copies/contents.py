@@ -41,7 +41,7 @@ class Contents:
     """
 
     def __init__(self, value: Any, references: References):
-        objects = [*_objects(value, references)]
+        objects = [*objects_in(value, references)]
         if len(objects) > MANY and all(type(one) in _MARSHALLED for one in objects):
             with suppress(ValueError):  # something else is in it, or it holds itself
                 self._held: list[Any] = [(_marshalled, value, _marshalled(value))]
@@ -56,8 +56,8 @@ class Contents:
             return False
 
 
-def _objects(value: Any, references: References) -> Iterator[Any]:
-    """A value and every object inside it."""
+def objects_in(value: Any, references: References) -> Iterator[Any]:
+    """A value and every object inside it, but for what is referred to."""
     waiting, seen = [value], {id(value)}
     while waiting:
         one = waiting.pop()

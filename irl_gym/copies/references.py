@@ -80,6 +80,11 @@ class References:
         self.objects.append(one)
         return len(self.objects) - 1
 
+    def meet(self, one: types.FunctionType) -> None:
+        """Refer to a function, as if a pickle had met it."""
+        if not self.knows(one):
+            self._first_met(one, type(one))
+
     def knows(self, one: Any) -> bool:
         """Do pickles refer to an object?"""
         return id(one) in self._numbers

@@ -1,7 +1,7 @@
 """Others in the places of random generators and of functions, wherever an environment holds them.
 
 A deep copy takes functions as they are: `self.moves = {0: lambda: self.go(0)}` of a copy moves the original. So a function that
-closes over a layer, or has one as default, is made anew over the layer's copy.
+closes over what was copied, or has it as default, is made anew over the copy.
 """
 
 import sys
@@ -105,11 +105,11 @@ class _Replacing:
 
 
 def renew_functions(env: gym.Env, copies: dict[int, Any]) -> list[Any]:
-    """Put functions of the copies in the place of those that hold layers of the environment that was copied.
+    """Put functions of the copies in the place of those that hold what was copied: a layer, a table that is an attribute too.
 
     Args:
         env: the caller's own copy; it is changed.
-        copies: the id of each layer of the original -> its copy.
+        copies: the id of each object that was copied -> its copy: the memo of `copy.deepcopy`.
 
     Returns:
         The cells of functions that were made anew, which no other function may share.
@@ -169,7 +169,7 @@ class _Renewing(_Replacing):
         self.cells: dict[int, tuple[Any, Any]] = {}
 
     def code(self, value: Any) -> Any:
-        if not isinstance(value, types.FunctionType) or not self._holds_layer(value, set()):
+        if not isinstance(value, types.FunctionType) or not self._holds_copied(value, set()):
             return value
         cells = tuple(self.cells.setdefault(id(old), (old, types.CellType()))[1] for old in value.__closure__ or ())
         made = types.FunctionType(value.__code__, value.__globals__, value.__name__, None, cells)
@@ -187,11 +187,13 @@ class _Renewing(_Replacing):
         made.__dict__.update({name: self._swapped(one) for name, one in value.__dict__.items()})
         return made
 
-    def _holds_layer(self, value: Any, seen: set[int]) -> bool:
-        if id(value) in self.copies or id(value) in seen:
-            return id(value) in self.copies
+    def _holds_copied(self, value: Any, seen: set[int]) -> bool:
+        if self.copies.get(id(value), value) is not value:
+            return True
+        if id(value) in seen:
+            return False
         seen.add(id(value))
-        return any(self._holds_layer(one, seen) for one in held_by(value))
+        return any(self._holds_copied(one, seen) for one in held_by(value))
 
     def _swapped(self, value: Any) -> Any:
         if isinstance(value, types.MethodType):

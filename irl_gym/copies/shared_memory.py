@@ -107,13 +107,13 @@ def _block(bounds: Extent, arrays: list[Any]) -> Block:
     return Block(bounds, arrays, np.frombuffer(raw, np.uint8))
 
 
-def shared(one: Any, other: Any) -> NotCopied:
-    """The error for memory whose sharing a copy would end."""
-    told = " and ".join(_told(part) for part in (one, other))
+def shared(one: Any, other: Any, *where: str) -> NotCopied:
+    """The error for memory whose sharing a copy would end, and where the two are, if that is known."""
+    told = " and ".join(_told(part) + at for part, at in zip((one, other), where or ("", ""), strict=True))
     return NotCopied(
         f"{told} share memory, which copies of them would not: expected memory shared by NumPy arrays of the class np.ndarray "
-        "alone. Hold one of them, and make the other where it is needed; or give the environment get_state() and "
-        "set_state(state)."
+        "alone, of which none is in what copies itself, as a table of pandas does. Hold one of them, and make the other where "
+        "it is needed; hold a copy of it where neither changes; or give the environment get_state() and set_state(state)."
     )
 
 

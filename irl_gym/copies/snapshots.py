@@ -13,6 +13,7 @@ Not seen: other state in class attributes and modules. An object that says itsel
 
 import copy
 import dataclasses
+import types
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -21,6 +22,7 @@ import gymnasium as gym
 from irl_gym.copies.apart import held_outside
 from irl_gym.copies.calls import called
 from irl_gym.copies.constants import Constant, Held, Home, found_in, unchanging
+from irl_gym.copies.contents import objects_in
 from irl_gym.copies.layer_state import LayerState
 from irl_gym.copies.object_graphs import (
     ABSENT,
@@ -144,6 +146,9 @@ class Snapshots:
                 raise
             except REFUSALS:
                 self._refuses_pickle = True
+        for one in objects_in(held, self._references):
+            if isinstance(one, types.FunctionType):
+                self._references.meet(one)
         return self._copied(held)
 
     def restore(self, state: Any) -> None:

@@ -78,7 +78,7 @@ def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> g
     known = memo | {id(one): one for _, value in held_outside(kept) for one in inside(value)}
     made, _, memo = copied(lambda told: _layers_copied(kept, chain, told), known)
     if made.unwrapped is not chain[-1]:  # else it speaks for itself
-        cells = renew_functions(made, {id(layer): memo[id(layer)] for layer in chain})
+        cells = renew_functions(made, memo)
         check_apart(layers(made), kept, memo, cells)
     return made
 

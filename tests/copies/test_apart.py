@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
+from walk_env import Stubborn
 
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.enumeration.table import Enumeration
@@ -68,6 +69,18 @@ def reads_a_list_that_stays(env):
     env.see = lambda: places[env.at]
 
 
+def closes_over_an_attribute_that_stays(env):
+    places = env.places = np.arange(N)
+    cells = env.cells = spaces.Discrete(N)
+    env.see = lambda: int(places[env.at]) if env.at in cells else -1
+
+
+def closes_over_an_attribute_alone(env):
+    places = env.places = np.arange(N)
+    env.name = lambda place: int(places[place])
+    env.see = types.MethodType(lambda self: self.name(self.at), env)
+
+
 def closes_over_a_lock(env):
     lock = threading.Lock()
     env.see = lambda: env.at + lock.locked()
@@ -92,6 +105,12 @@ def through(put, see):
 def closes_over_a_list(env):
     box = env.box
     env.put, env.see = lambda place: box.__setitem__(0, place), types.MethodType(lambda self: self.box[0], env)
+
+
+def closes_over_a_list_of_lists(env):
+    boxes = [env.box]
+    env.put = lambda place: boxes[0].__setitem__(0, place)
+    env.see = types.MethodType(lambda self: self.box[0], env)
 
 
 class One:
@@ -121,6 +140,14 @@ def a_view_that_copies_itself(env):
     env.array = np.zeros(3, int)
     env.view = Copied(env.array[1:])
     through(lambda self, place: self.array.fill(place), lambda self: int(self.view.array[0]))(env)
+
+
+def beside_what_has_no_pickle(give):
+    def both(env):
+        env.odd = Stubborn()
+        give(env)
+
+    return both
 
 
 def sets_a_variable(env):
@@ -224,6 +251,8 @@ def of_the_class(env):
         functions_of_functions,
         a_method_behind_a_function,
         reads_a_list_that_stays,
+        closes_over_an_attribute_that_stays,
+        closes_over_an_attribute_alone,
         logs,
         closes_over_a_lock,
     ],
@@ -237,7 +266,8 @@ def test_a_function_that_holds_the_environment_holds_its_copy_in_a_copy(give):
 
 
 REFUSED = {
-    "a list of a closure's": (Line, closes_over_a_list, "Line.put leads to a list"),
+    "a list of a closure's": (Line, closes_over_a_list, "changes what the function .* holds .box., which all"),
+    "a list in a list of a closure's": (Line, closes_over_a_list_of_lists, "Line.put leads to a list"),
     "a weak reference": (Line, weakly(weakref.ref, lambda ref: ref()), "Line.weak leads to a One"),
     "a weak proxy": (Line, weakly(weakref.proxy, lambda one: one), "Line.weak leads to a "),
     "a weak dict": (Line, weakly(lambda one: weakref.WeakValueDictionary({0: one}), lambda held: held[0]), "leads to a One"),
@@ -247,6 +277,11 @@ REFUSED = {
     "a dictionary of its own attributes": (Line, a_dictionary_of_its_own_attributes, "Line.one leads to a Attributes whose"),
     "attributes of two objects": (Line, attributes_of_two, "leads to a One whose __dict__ is held in another way too"),
     "memory that processes share": (Line, shared_memory, "Line.memory leads to a SharedMemory"),
+    "a variable that is set beside what has no pickle": (
+        Line,
+        beside_what_has_no_pickle(sets_a_variable),
+        "changes what the function .*put holds .at.",
+    ),
     "a module's": (WithBoard, of_the_module, "changes .*test_apart.BOARD, which all copies share"),
     "a class's": (WithBoard, of_the_class, "changes WithBoard.board, which all copies share"),
     "a base class's": (OfBase, of_the_class, "changes Boarded.board, which all copies share"),
@@ -274,7 +309,7 @@ class Told(Line):
 
 
 def test_get_state_and_set_state_mend_what_leads_back():
-    table = Enumeration().table(Told(closes_over_a_list), 0.9)
+    table = Enumeration().table(Told(closes_over_a_list_of_lists), 0.9)
     assert (table.mdp.n_states, table.evidence.exact) == (N, True)
 
 

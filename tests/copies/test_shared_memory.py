@@ -97,6 +97,21 @@ def test_what_else_shares_memory_is_refused(name):
         Enumeration().table(REFUSED[name](), 0.9)
 
 
+def test_a_table_of_pandas_and_its_column_are_named_and_a_copy_of_the_column_mends_it():
+    pandas = pytest.importorskip("pandas")
+
+    def line(copy):
+        table = pandas.DataFrame({"x": np.arange(N), "y": np.arange(N)})
+        env = Line([0], lambda held, at: held.__setitem__(0, at), None)
+        env.table, env.column = table, table["y"].to_numpy(copy=copy)
+        env.read = lambda held: env.column[held[0]]
+        return env
+
+    with pytest.raises(NotCopied, match=r"in Line\.column and .* in Line\.table share memory"):
+        Enumeration().table(line(False), 0.9)
+    assert Enumeration().table(line(True), 0.9).evidence.exact
+
+
 class Told(Line):
     def get_state(self):
         return int(self.read(self.held))

@@ -50,6 +50,11 @@ def test_findings_exit_with_1_and_are_printed_with_their_mends(doctor, runs):
     assert done.returncode == 1 and "avoidable-ties" in done.stdout and 'Mend: margin_cap="auto"' in done.stdout
 
 
+def test_what_is_a_record_and_not_computed_is_said(doctor, runs):
+    said = "as lambda_0 and what its solver said, and what episodes showed is the run's own record; all else is computed now."
+    assert said in doctor(runs / "paper").stdout
+
+
 def test_mends_are_flags_too_and_states_have_their_names(doctor, runs):
     said = doctor(runs / "paper").stdout
     assert "Flags: --margin-cap auto, --l1 0" in said and re.search(

@@ -24,6 +24,13 @@ def mends(message):
     return re.findall(r"`([^`]*)`", message)
 
 
+def message(breaks, *given):
+    """What the error says that a call raises."""
+    with pytest.raises(errors.IrlGymError) as caught:
+        breaks(*given)
+    return str(caught.value)
+
+
 def named(*files):
     """Patterns of the mends that errors of these files of the library name: what follows what was expected, if no question."""
     for file in files:

@@ -129,6 +129,9 @@ AGAINST = dict(enumerate(-MODEL.R))
 AT_ONE, FEW = {3: 1.0}, {s: AGAINST[s] for s in range(3)}
 ACTING = ~ENDING.mdp.terminal[:, None]
 EVEN = ACTING / (ACTING.sum() * 3) * np.ones((8, 3))
+ASIDE = TabularMDP.from_dense(
+    np.array([[[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], [[0, 0, 0], [0, 0, 0]]]) * 1.0, 0.9, np.eye(3)[0]
+)
 CASES = [
     # learners
     ("Give the next observations when they are imported.",
@@ -172,6 +175,11 @@ CASES = [
     ("Lower it,", lambda: widths(margin=0.9), lambda: widths(margin=1e-3)),
     ("or raise r_max.", lambda: widths(margin=0.9), lambda: widths(margin=0.9, r_max=1e3)),
     ("Raise r_max.", lambda: widths(pinned={0: 2.0}), lambda: widths(pinned={0: 2.0}, r_max=4.0, margin=None)),
+    ("no policy reaches state 1, so its reward is free. Drop it.",
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), pinned={1: 0.5}), lambda: feasible_widths(ASIDE, np.zeros(3, int))),
+    ("state 2 is terminal, no step is taken there. Drop it.",
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), pinned={(2, 0): 0.5}, **STEPS),
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), **STEPS)),
     # distances
     ("Let it follow itself.",
      lambda: epic_bound(ENDING.mdp, *rewards_of(ENDING)),

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import tyro
-from lake_run import COMMAND
+from lake_run import COMMAND, asked
 from mended import mends, message, named
 from stable_baselines3 import PPO
 
@@ -19,6 +19,8 @@ from irl_gym.counting import Interaction
 from irl_gym.experiment import Experiment
 from irl_gym.features import OneHot
 from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.own_files import held
+from irl_gym.pipeline import recover_and_retrain
 from irl_gym.places import place_of
 from irl_gym.planners import SB3, Agent, ValueIteration
 from irl_gym.run_folder import read_json, write_json
@@ -124,7 +126,15 @@ def again(run):
     return read_run(run)
 
 
+def busy(run):
+    """Two processes ask for one folder."""
+    with held(run, "the first"):
+        return recover_and_retrain(asked(), run)
+
+
 READ = [
+    ("wait for it,", "run.json", {}, busy, lambda run: recover_and_retrain(asked(), run)),
+    ("or choose another --out.", "run.json", {}, busy, lambda run: claim(run.parent / "another", {}) is None),
     ("Name the --out of a run.", "config.json", None, read_run, lambda run: read_run(run.parent / "whole")),
     (
         "If they were changed, or another program wrote them, make the run again; "

@@ -24,19 +24,18 @@ def mends(message):
     return re.findall(r"`([^`]*)`", message)
 
 
-def message(breaks, *given):
-    """What the error says that a call raises."""
-    with pytest.raises(errors.IrlGymError) as caught:
-        breaks(*given)
-    return str(caught.value)
+def named(*files, wide=False):
+    """Patterns of the mends that errors of these files of the library name: what follows what was expected, if no question.
 
-
-def named(*files):
-    """Patterns of the mends that errors of these files of the library name: what follows what was expected, if no question."""
+    Widely, also the last sentences of errors that do not say what was expected.
+    """
     for file in files:
         for node in ast.walk(ast.parse((Path(errors.__file__).parent / file).read_text())):
             if isinstance(node, ast.Call) and hasattr(errors, getattr(node.func, "id", "")) and node.args:
-                texts = [_text(node.args[0]).partition(": expected")[2].partition(". ")[2]]
+                text = _text(node.args[0])
+                texts = [text.partition(": expected")[2].partition(". ")[2]]
+                if wide and ": expected" not in text:
+                    texts = re.findall(r"\. ([A-Z`].*)", text)
             elif isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "").lower() == "mend":
                 one = node.value
                 texts = map(_text, [one.body, one.orelse] if isinstance(one, ast.IfExp) else [one])
@@ -53,6 +52,19 @@ def _text(node):
     """A text of the code, with a sign in place of what is filled in."""
     parts = node.values if isinstance(node, ast.JoinedStr) else [node]
     return "".join(one.value if isinstance(getattr(one, "value", 0), str) else "\0" for one in parts)
+
+
+def told(breaks, *given):
+    """What the error says that something breaks with."""
+    with pytest.raises((errors.IrlGymError, FileNotFoundError)) as caught:
+        breaks(*given)
+    return str(caught.value)
+
+
+def unsaid(cases, *files):
+    """The mends of these files that no case says."""
+    said = " ".join(says for says, *_ in cases)
+    return [one for one in named(*files, wide=True) if not re.search(one, said)]
 
 
 def done(code, env):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from enumeration_envs import Corridor
 from gymnasium import spaces
-from mended import message, named
+from mended import told, unsaid
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
@@ -148,21 +148,20 @@ CASES = [
     ("Write it again.", damaged, lambda root: load_expert(shown(root))),
     ("Write them with np.savez('statistics.npz', ",
      impossible,
-     lambda root: by_hand(root, message(impossible, root))),
-    ("expected numbers written with np.savez(", without_a_clip, lambda root: by_hand(root, message(without_a_clip, root))),
+     lambda root: by_hand(root, told(impossible, root))),
+    ("expected numbers written with np.savez(", without_a_clip, lambda root: by_hand(root, told(without_a_clip, root))),
     ("Nothing in it was run. Write them as numbers: np.savez(",
-     rewards_alone, lambda root: by_hand(root, message(rewards_alone, root))),
+     rewards_alone, lambda root: by_hand(root, told(rewards_alone, root))),
 ]  # fmt: skip
 FILES = [f"{one}.py" for one in ("experts", "noise", "shown", "evaluation", "demonstrators", "planners", "pickled")]
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])
 def test_a_mend_that_an_error_about_experts_names_serves(tmp_path, says, breaks, mended):
-    assert says in message(breaks, tmp_path)
+    assert says in told(breaks, tmp_path)
     served = mended(tmp_path)
     assert served is not None and served is not False
 
 
 def test_every_mend_that_an_error_about_experts_names_is_executed():
-    said = " ".join(one[0] for one in CASES)
-    assert not [one for one in named(*FILES) if not re.search(one, said)]
+    assert not unsaid(CASES, *FILES)

@@ -84,7 +84,9 @@ def check_format(path: Path, told: Mapping[str, Any]) -> None:
         return
     number = re.fullmatch(r"irl_gym\.Run/([0-9]{1,9})", str(found))
     if number is None or int(number[1]) <= NUMBER:
-        raise RunConflict(f"{path / VERSION} has format {found!r}: expected {FORMAT!r}. Is it another program's?")
+        raise RunConflict(
+            f"{path / VERSION} has format {found!r}: expected {FORMAT!r}. If irl_gym made the run, delete that file."
+        )
     raise RunNewer(
         f"{path} has format {found!r}, written by irl_gym {told.get('irl_gym')}: expected {FORMAT!r}, which is what irl_gym "
         f"{_version()} reads. Upgrade irl_gym."

@@ -166,7 +166,7 @@ def optimal_set(loop: "Loop") -> ActionSets:
     """(S, A) the expert's optimal set: all optimal actions if it is optimal, errs or is known by data, else those it takes."""
     world = loop.world
     if not isinstance(world, TableWorld):
-        raise NotTabular("the environment is only stepped: expected a table. Which actions are optimal is not known.")
+        raise NotTabular("the environment is only stepped: expected a table, which tells optimal actions.")
     mdp, true = world.table.mdp, world.table.reward
     return good_actions(mdp, None if loop.experiment.from_episodes else loop.expert, optimum(mdp, true))
 

@@ -218,8 +218,9 @@ def load_expert(
     algorithm = algorithm or maker
     if algorithm is None:
         raise InvalidParameter(
-            f"{path} holds no agent of {', '.join(get_args(Algorithm))}: expected one of these. Name its algorithm, if it is "
-            "one of them after all; an agent of another library is a policy as it is, since it has `predict`."
+            f"{path} holds no agent of {', '.join(get_args(Algorithm))}: expected one of these. An agent of another "
+            "library is a policy as it is, since it has `predict`: give its episodes (`collect`, `write_minari`). If it is one "
+            "of these after all, name its algorithm."
         )
     if maker not in (None, algorithm):
         raise InvalidParameter(f"{path} holds no {algorithm} agent: expected {maker}, which its settings tell. Name that.")

@@ -193,7 +193,7 @@ def stage(env_id: str, env_kwargs: Mapping[str, Any], mode: Mode) -> tuple[gym.E
         other = next((f" Play in the {name}." for name, modes in _RENDER_MODES.items() if {*modes} & {*offered}), "")
         raise InvalidParameter(
             f"{env_id} renders {', '.join(offered) or 'nothing'}: expected {' or '.join(_RENDER_MODES[mode])} for a {mode}."
-            f"{other or ' Give it a `render` and name its modes in metadata.'}"
+            f"{other or ' Give it a `render`, and metadata with its `render_modes` and `render_fps`.'}"
         )
     shown = make(env_id, **env_kwargs, render_mode=found[0])
     shown = Reveal(shown) if known_hidden(shown) else shown

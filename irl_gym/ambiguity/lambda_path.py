@@ -25,7 +25,7 @@ from irl_gym.ambiguity.priced import PricedProgram
 from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
 from irl_gym.deadline import Deadline
-from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
+from irl_gym.errors import DegenerateExpert, InvalidPolicy, InvalidReward
 from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
@@ -240,7 +240,7 @@ def lambda_path(
     found = envelope(program.at, most_pieces, nothing) if program.states.size else None
     if found is None or found.breakpoints[-1] <= NO_MARGIN:
         learner.critical_l1(mdp, expert)  # says why
-        raise InvalidParameter(f"margin_cap is {margin_cap!r}: expected one above the solver's rounding. Raise it.")
+        raise DegenerateExpert("no reward has a margin above rounding: expected one that prefers the expert's actions.")
     return LambdaPath(
         breakpoints=found.breakpoints,
         rewards=np.stack([line.R for line in found.lines]),

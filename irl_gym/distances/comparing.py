@@ -51,7 +51,7 @@ def standardised(values: Numbers, weights: Numbers, rounding: float, name: str) 
         raise UndefinedDistance(
             f"the canonical form of {name} has deviation {deviation:.1e} on the coverage distribution: expected more than "
             f"rounding, {least:.1e}, or its distance from another is not defined. The reward is zero, constant or only a "
-            "potential, or the coverage too narrow. `starc` has a place for such rewards."
+            "potential, or the coverage too narrow. Of rewards in a table, `starc` has a place for it."
         )
     return centred / deviation
 

@@ -87,7 +87,10 @@ class Transitions:
         _, number = np.unique(np.asarray(self.groups), return_inverse=True)
         count = int(number.max()) + 1
         if count < 2:
-            raise UndefinedDistance("all transitions are of one group: expected at least 2 groups, or the error is not known.")
+            raise UndefinedDistance(
+                "all transitions are of one group: expected at least 2 groups, or the error is not known. Give more episodes; "
+                "or, without it, groups=None for transitions in order."
+            )
         return number * min(most, count) // count
 
 

@@ -1,0 +1,149 @@
+"""Every finding of the doctor has its mend executed: here, or in the test that is named."""
+
+import ast
+from pathlib import Path
+
+import gymnasium
+import pytest
+from chain_world import Chain
+from enumeration_envs import Slippery
+from models import paper_grid
+from patients import names
+
+from irl_gym import diagnoses, solvers
+from irl_gym.bases import RadialBasis
+from irl_gym.counting import Interaction
+from irl_gym.diagnoses.case import Case
+from irl_gym.diagnosis import diagnose
+from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.features import OneHot
+from irl_gym.generative import GenerativeModel
+from irl_gym.imports import from_arrays
+from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.metrics import policy_value
+from irl_gym.tabulate import tabulate
+
+GRID, LAKE = paper_grid(), gymnasium.make("FrozenLake-v1", is_slippery=False)
+
+
+class Poor(Chain):
+    """Plans for the contrary."""
+
+    def plan(self, reward, *, seed=0):
+        return self.policy(-reward.tabular(self.states).values)
+
+
+class Ahead:
+    """Goes where the corner of the continuous grid world is further."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return (observation[:, 0] <= observation[:, 1]).astype(int), state
+
+
+def trajectories(world=None, expert=100, **how):
+    """What the doctor says of TrajectoryLP in a small world."""
+    world = Chain() if world is None else world
+    learner = TrajectoryLP(OneHot(8), **{"trajectories": 60, "max_rounds": 4} | how)
+    return names(learner.fit(world, world.expert(expert)), None, None)
+
+
+def rollouts(samples):
+    model = GenerativeModel(gymnasium.make("irl_gym_envs:irl_gym/ContinuousGridWorld-v0"), 0.9)
+    return names(FeatureLP(RadialBasis.grid([0, 0], [1, 1], 2), S_0=5, samples=samples).fit(model, Ahead()), None, None)
+
+
+def hobbled(solver):
+    """The grid, solved where HiGHS gives no answer."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {"simplex_iteration_limit": 0, "presolve": "off"}.items():
+            patch.setitem(solvers._SOLVERS["highs"].options, name, value)
+        return names(FiniteLP(solver=solver, margin_cap=None).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert)
+
+
+def noise(steps):
+    table = tabulate(Slippery(n=25), gamma=0.9, by=Interaction(steps), check_steps=0)
+    expert = policy_iteration(table.mdp, table.reward).policy
+    return names(FiniteLP().fit(table.mdp, expert), table.mdp, expert)
+
+
+def told(**judged):
+    return diagnose(Case(judged=judged, claims={"gaps": []})).names
+
+
+def counted(steps):
+    """What the best policy earns by a counted table, against episodes, of which the true table knows."""
+    table, true = (tabulate(Slippery(), gamma=0.9, by=by, check_steps=0) for by in (Interaction(steps), None))
+    best = policy_iteration(true.mdp, true.reward).policy
+    same = best[[true.states.encode(table.states.decode(row)) for row in range(table.mdp.n_states)]]
+    low = high = policy_value(true.mdp, true.reward, best)
+    row = {"value": policy_value(table.mdp, table.reward, same), "sampled_value": low, "sampled_low": low, "sampled_high": high}
+    return told(policies={"expert": {"value": low}, "random": {"value": 0.0}, "retrained": row})
+
+
+def imported(**more):
+    """What a run notes of episodes whose last observations were recorded, or not."""
+    episodes = from_arrays([0, 4, 0], [1, 1, 1], lengths=[2, 1], env=LAKE, **more)
+    return told(demonstrations={"unseen": sum(one.ending == "unseen" for one in episodes), "episodes": len(episodes)})
+
+
+CASES = [
+    ("noisy-rows", lambda: rollouts(4), lambda: rollouts(16)),
+    ("planner-fell-short", lambda: trajectories(Poor()), lambda: trajectories(Chain())),
+    ("expert-beaten", lambda: trajectories(Chain(4), trajectories=200, max_rounds=1),
+     lambda: trajectories(Chain(4), trajectories=200, max_rounds=12)),
+    ("too-few-trajectories", lambda: trajectories(Chain(9), 3, trajectories=2),
+     lambda: trajectories(Chain(9), 48, trajectories=32)),
+    ("cut-short", lambda: trajectories(horizon=3), lambda: trajectories(horizon=20)),
+    ("solver-retried", lambda: hobbled("highs"), lambda: hobbled("clarabel")),
+    ("table-not-confirmed", lambda: counted(60), lambda: counted(3_000)),
+    ("within-sampling-error", lambda: noise(3_200), lambda: noise(25_600)),
+    ("unseen-ends", imported, lambda: imported(next_observations=[4, 8, 1])),
+]  # fmt: skip
+ELSEWHERE = {
+    "lambda-above-lambda-0": "test_nothing.py: test_the_first_mend_of_a_price_above_lambda_0_is_healthy",
+    "zero-weights": "test_nothing.py: test_a_price_of_0_mends_zero_weights",
+    "nothing-to-compare": "test_nothing.py: test_a_reward_on_steps_mends_actions_of_the_same_successors",
+    "unexplained-expert": "test_nothing.py: test_a_reward_on_steps_explains_every_expert",
+    "no-reward": "test_nothing.py: test_the_defaults_mend_a_flat_reward",  # which runs the learner
+    "zero-reward": "test_nothing.py: test_the_defaults_mend_a_flat_reward",  # by the same defaults
+    "flat-reward": "test_nothing.py: test_the_defaults_mend_a_flat_reward",
+    "inexpressible": "test_sampled.py: test_one_feature_a_state_mends_features_that_cannot_express",
+    "solver-inaccurate": "test_solving.py: test_the_other_solver_mends_an_answer_that_was_short",
+    "far-from-optimal": "test_solving.py: test_the_other_solver_mends_an_answer_that_was_short",
+    "expert-not-optimal": "test_ties.py: test_the_defaults_mend_an_expert_that_is_not_optimal",
+    "avoidable-ties": "test_ties.py: test_a_cap_on_margins_mends_avoidable_ties",
+    "worst-tie": "test_ties.py: test_a_cap_on_margins_mends_avoidable_ties",
+    "unbreakable-ties": "test_ties.py: test_a_reward_on_steps_mends_unbreakable_ties",
+    "same-successors": "test_ties.py: test_a_reward_on_steps_mends_the_same_successors",
+    "expert-suboptimal": "test_truth.py: test_a_better_expert_mends_both",
+    "expert-worse-than-random": "test_truth.py: test_a_better_expert_mends_both",
+    "blind-expert": "../test_normalised_experts.py: test_an_export_shows_its_expert_what_its_training_showed",
+    "few-episodes": "../test_pipeline_from_data.py: test_the_doctor_finds_that_two_episodes_are_few",
+    "dropped-actions": "../test_last_actions.py: test_a_log_of_taxi_without_next_observations_teaches_the_drop_off",
+    "unvisited-states": "test_unseen.py: test_more_of_the_expert_mends_unvisited_states",
+    "strays": "test_unseen.py: test_avoiding_unknown_states_mends_strays",
+    "small-gamma": "test_values.py: test_the_larger_gamma_mends_margins_that_vanish",
+    "gamma-near-one": "test_values.py: test_the_smaller_gamma_mends_margins_that_drown",
+    "never-ends": "test_values.py: test_an_end_mends_what_never_ends",
+    "faint-margins": "test_values.py: test_shaping_mends_faint_margins",
+    "flat-weights": "test_weights.py: test_a_price_mends_flat_weights",
+}
+
+
+@pytest.mark.parametrize(("name", "ill", "mended"), CASES, ids=[one[0] for one in CASES])
+def test_the_mend_of_a_finding_serves(name, ill, mended):
+    assert name in ill() and name not in mended()
+
+
+def test_every_finding_of_the_doctor_has_its_mend_executed():
+    found = set()
+    for file in Path(diagnoses.__file__).parent.glob("*.py"):
+        calls = [one for one in ast.walk(ast.parse(file.read_text())) if isinstance(one, ast.Call) and one.args]
+        names = [one.args[0] for one in calls if getattr(one.func, "id", "") in ("Finding", "_found")]
+        found |= {one.value for one in names if isinstance(one, ast.Constant)}
+    assert found == {one[0] for one in CASES} | ELSEWHERE.keys()
+    for place in ELSEWHERE.values():
+        file, _, test = place.partition(": ")
+        assert f"def {test}(" in (Path(__file__).parent / file).read_text()

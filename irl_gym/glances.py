@@ -5,6 +5,7 @@ stepping thousands of episodes at once takes a hundredth of the time of stepping
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class Glances:
         self._steps.append(steps)
         updates = getattr(getattr(policy, "model", None), "_n_updates", None)  # SB3 counts its gradient steps there
         if updates is not None and updates == self._updates:
+            kept: list[Any]
             for kept in (self._values, self._actions, self._returns):
                 kept.extend(kept[-1:])
             return

@@ -166,7 +166,7 @@ CASES = [
     # time
     ("raise time_limit, or choose the other solver.", lambda: hurried(1e-9), lambda: hurried(60.0)),
     ("raise time_limit, or give most_pieces.", lambda: path(time_limit=1e-9), lambda: path(time_limit=60.0, most_pieces=2)),
-    ("Is there enough memory? Leave time_limit out, and no process is started.",
+    ("Is there enough memory? Without time_limit the first solver works in this process, and is not ended.",
      lambda: in_child(60.0, 3), lambda: in_child(None, None)),
     # sets of rewards
     ("For one that is not the program is another, without a path here: use FiniteLP(l1=...) at a few prices.",

@@ -17,7 +17,7 @@ import numpy as np
 
 from irl_gym.copies.object_graphs import ATOMS, CODE, GENERATORS, SHARED, attributes, children
 from irl_gym.copies.replacing import held_by
-from irl_gym.copies.shared_memory import extent, holds_memory, overlap, shared
+from irl_gym.copies.shared_memory import extent, holds_memory, mapped, of_a_file, overlap, shared
 from irl_gym.errors import NotCopied
 
 
@@ -42,6 +42,8 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
     for name, one in _reached(copied):
         if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
             raise _leads_back(name, one)
+        if mapped(one):
+            raise of_a_file(one, name)
         if holds_memory(type(one)):
             memories.append((name, one))
         if isinstance(one, dict):

@@ -9,6 +9,7 @@ at the same offset.
 import array
 import copy
 import ctypes
+import mmap
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -114,6 +115,27 @@ def shared(one: Any, other: Any, *where: str) -> NotCopied:
         f"{told} share memory, which copies of them would not: expected memory shared by NumPy arrays of the class np.ndarray "
         "alone, of which none is in what copies itself, as a table of pandas does. Hold one of them, and make the other where "
         "it is needed; hold a copy of it where neither changes; or give the environment get_state() and set_state(state)."
+    )
+
+
+def mapped(one: Any) -> bool:
+    """Is an array's memory a file's (or of processes that share it), so that what is written to it is read elsewhere too?"""
+    while isinstance(one, np.ndarray | memoryview):
+        if isinstance(one, np.memmap) and one.mode is not None:
+            return one.mode in ("r+", "w+")
+        if isinstance(one, memoryview) and one.readonly:
+            return False
+        one = one.obj if isinstance(one, memoryview) else one.base
+    return isinstance(one, mmap.mmap) and not memoryview(one).readonly
+
+
+def of_a_file(one: Any, where: str = "an attribute") -> NotCopied:
+    """The error for memory that is a file's, and the attribute that leads there, if that is known."""
+    return NotCopied(
+        f"{where} leads to {_told(one)} that writes to a file (numpy.memmap in mode 'r+', say), which copies of it would not: "
+        "expected arrays whose memory is their own. Load it in __init__, as by numpy.array(...) of it; open it with mode='r' "
+        "where it is only read, or 'c' where no other reads the file; or give the environment get_state() and "
+        "set_state(state)."
     )
 
 

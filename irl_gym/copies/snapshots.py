@@ -37,7 +37,7 @@ from irl_gym.copies.object_graphs import (
 )
 from irl_gym.copies.references import References, twins
 from irl_gym.copies.replacing import held_by, replace_generators
-from irl_gym.copies.shared_memory import copied, extent, overlap
+from irl_gym.copies.shared_memory import copied, extent, mapped, of_a_file, overlap
 from irl_gym.copies.stripped import awaken_generators, duplicate, layers
 from irl_gym.errors import InvalidParameter, NotCopied, NotEnumerable, NotTabular
 
@@ -88,6 +88,7 @@ class Snapshots:
         Raises:
             ConstantChanged: something else is in the place of a constant, or shares its memory: `include` it, and start again.
             NotTabular: the environment made a new generator, or holds what cannot be copied.
+            NotCopied: it holds memory of a file.
         """
         again: dict[int, Any] = {}
         for one in self._constants:
@@ -98,9 +99,12 @@ class Snapshots:
             state, memories = self._taken()
             if self._hold():
                 state, memories = self._taken()
-        for memory in map(extent, memories):
+        for memory in memories:
+            if mapped(memory):
+                raise of_a_file(memory)
+            at = extent(memory)
             for one in self._constants:
-                if any(overlap(memory, other) for other in one.extents):
+                if any(overlap(at, other) for other in one.extents):
                     raise ConstantChanged(one.home.name)
         return state
 

@@ -9,13 +9,14 @@ import copyreg
 import io
 import pickle
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from irl_gym.copies.object_graphs import ATOMS, Twin, children
+from irl_gym.copies.own_dictionaries import own, reduced
 from irl_gym.copies.replacing import changeable, held_by
 from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory
 from irl_gym.errors import NotTabular
@@ -49,11 +50,15 @@ class References:
 
         methods = {**copyreg.dispatch_table, types.MethodType: lambda one: (types.MethodType, (one.__func__, one.__self__))}
         methods |= dict.fromkeys((np.void, np.record), lambda one: (np.ndarray.__getitem__, (np.array(one).copy(), ())))
-        own = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
+        parts = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
+        self._methods = methods
+        self.joined: set[type] = set()
+        """Types of objects whose `__dict__` may be held in another way too."""
+
         self.functions: list[types.FunctionType] = []
         """Functions that were met and that hold objects, none of which is in a pickle."""
 
-        self._pickler = type("Pickler", (pickle.Pickler,), own)
+        self._pickler = type("Pickler", (pickle.Pickler,), parts)
         self._sharing = type("Sharing", (self._pickler,), {"reducer_override": lambda pickler, one: pickler.reduced(one)})
         self._unpickler = type("Unpickler", (pickle.Unpickler,), {"persistent_load": self.objects.__getitem__})
 
@@ -80,6 +85,11 @@ class References:
         self.objects.append(one)
         return len(self.objects) - 1
 
+    def join(self, kind: type) -> None:
+        """Have what is loaded of objects of this type hold, as their `__dict__`, the very dictionary that others hold."""
+        self.joined.add(kind)
+        self._methods[kind] = reduced
+
     def meet(self, one: types.FunctionType) -> None:
         """Refer to a function, as if a pickle had met it."""
         if not self.knows(one):
@@ -98,7 +108,7 @@ class References:
                 continue
             if one is value or (type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic)):
                 self.refer(one)
-            for part in (*children(one), *held_by(one)):
+            for part in (*children(one), *held_by(one), *own(one, self.joined)):
                 if type(part) not in ATOMS and id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
@@ -155,11 +165,11 @@ class References:
         return None
 
 
-def twins(one: Any, other: Any) -> dict[int, Any] | None:
+def twins(one: Any, other: Any, joined: Collection[type]) -> dict[int, Any] | None:
     """The id of each object inside a value -> what is in its place inside another; None where that is built otherwise."""
     found, waiting = {id(one): other}, [(one, other)]
     while waiting:
-        first, second = ([*children(value)] for value in waiting.pop())
+        first, second = ([*children(value), *own(value, joined)] for value in waiting.pop())
         if len(first) != len(second):
             return None
         for a, b in zip(first, second, strict=True):

@@ -174,13 +174,17 @@ def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T
 
 
 def _met(memo: Any) -> Iterator[Any]:
-    """What holds memory among all that was copied with a memo: `copy.deepcopy` keeps it alive there."""
-    alive = memo.get(id(memo))
-    for one in alive if isinstance(alive, list) else ():
+    """What holds memory among all that was copied with a memo."""
+    return (one for one in alive(memo) if holds_memory(type(one)))
+
+
+def alive(memo: Any) -> Iterator[Any]:
+    """All that was copied with a memo: `copy.deepcopy` keeps it alive there."""
+    kept = memo.get(id(memo))
+    for one in kept if isinstance(kept, list) else ():
         if type(one) is dict:
-            yield from _met(one)  # the memo of a layer
-        elif holds_memory(type(one)):
-            yield one
+            yield from alive(one)  # the memo of a layer
+        yield one
 
 
 class Sharing:

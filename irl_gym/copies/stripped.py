@@ -12,8 +12,9 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.wrappers import TimeLimit
 
-from irl_gym.copies.apart import check_apart, held_outside, inside
+from irl_gym.copies.apart import check_apart, held_outside, inside, joined
 from irl_gym.copies.object_graphs import SHARED, attributes, children
+from irl_gym.copies.own_dictionaries import rejoin
 from irl_gym.copies.replacing import renew_functions
 from irl_gym.copies.shared_memory import copied
 from irl_gym.errors import NotCopied
@@ -78,6 +79,7 @@ def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> g
     known = memo | {id(one): one for _, value in held_outside(kept) for one in inside(value)}
     made, _, memo = copied(lambda told: _layers_copied(kept, chain, told), known)
     if made.unwrapped is not chain[-1]:  # else it speaks for itself
+        rejoin(joined(kept), memo)
         cells = renew_functions(made, memo)
         check_apart(layers(made), kept, memo, cells)
     return made

@@ -171,6 +171,35 @@ def a_dictionary_of_its_own_attributes(env):
     through(lambda self, place: setattr(self.one, "at", place), lambda self: self.one["at"])(env)
 
 
+def attributes_beside_their_object(env):
+    env.one = One()
+    env.one.at = 0
+    env.mine = vars(env.one)
+    through(lambda self, place: self.mine.__setitem__("at", place), lambda self: self.one.at)(env)
+
+
+def large(give):
+    def both(env):
+        give(env)
+        env.one.places = list(range(400))
+
+    return both
+
+
+def made_anew_by_reset(give):
+    def both(env):
+        def put(self, place):
+            if place == 0:
+                give(self)
+                self.one.places, self.put = list(range(400)), types.MethodType(put, self)
+            self.one.at = place
+
+        give(env)
+        env.put = types.MethodType(put, env)
+
+    return both
+
+
 def its_own_attributes(env):
     env.mine = vars(env)
     env.put = types.MethodType(lambda self, place: self.mine.__setitem__("at", place), env)
@@ -243,6 +272,9 @@ def of_the_class(env):
     env.put = types.MethodType(lambda self, place: self.mine[0].__setitem__(0, place), env)
 
 
+JOINED = (a_dictionary_of_its_own_attributes, attributes_beside_their_object)
+
+
 @pytest.mark.parametrize(
     "give",
     [
@@ -255,6 +287,8 @@ def of_the_class(env):
         closes_over_an_attribute_alone,
         logs,
         closes_over_a_lock,
+        *JOINED,
+        *(change(give) for give in JOINED for change in (large, made_anew_by_reset, beside_what_has_no_pickle)),
     ],
 )
 def test_a_function_that_holds_the_environment_holds_its_copy_in_a_copy(give):
@@ -274,7 +308,6 @@ REFUSED = {
     "a view that copies itself": (Line, a_view_that_copies_itself, "share memory"),
     "a variable that is set": (Line, sets_a_variable, "changes what the function .*put holds .at., which all copies share"),
     "its own attributes": (Line, its_own_attributes, "whose __dict__ is held in another way too"),
-    "a dictionary of its own attributes": (Line, a_dictionary_of_its_own_attributes, "Line.one leads to a Attributes whose"),
     "attributes of two objects": (Line, attributes_of_two, "leads to a One whose __dict__ is held in another way too"),
     "memory that processes share": (Line, shared_memory, "Line.memory leads to a SharedMemory"),
     "a variable that is set beside what has no pickle": (

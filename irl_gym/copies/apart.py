@@ -37,11 +37,11 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
     anew = {id(cell) for cell in cells}
     for name, one in _reached(made):
         if id(one) in anew or (memo.get(id(one), one) is not one and not isinstance(one, _FIXED)):
-            raise _leads_back(name, one)
+            raise leads_back(name, one)
     memories = []
     for name, one in _reached(copied):
         if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
-            raise _leads_back(name, one)
+            raise leads_back(name, one)
         if mapped(one):
             raise of_a_file(one, name)
         if holds_memory(type(one)):
@@ -134,7 +134,8 @@ def inside(value: Any) -> list[Any]:
     return [one for one in seen.values() if type(one) not in ATOMS and not isinstance(one, _OWN)]
 
 
-def _leads_back(name: str, one: Any) -> NotCopied:
+def leads_back(name: str, one: Any) -> NotCopied:
+    """The error for what leads to an original from a copy, and the attribute by which it does."""
     mend = "Make it a tuple, if it never changes; or make" if isinstance(one, list) else "Make"
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "

@@ -9,6 +9,7 @@ import copyreg
 import io
 import pickle
 import types
+import weakref
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -50,6 +51,7 @@ class References:
 
         methods = {**copyreg.dispatch_table, types.MethodType: lambda one: (types.MethodType, (one.__func__, one.__self__))}
         methods |= dict.fromkeys((np.void, np.record), lambda one: (np.ndarray.__getitem__, (np.array(one).copy(), ())))
+        methods[weakref.ref] = self._weak
         parts = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
         self._methods = methods
         self.joined: set[type] = set()
@@ -144,6 +146,13 @@ class References:
             return number if number is not None or kind in plain else met(one, kind)
 
         return persistent_id
+
+    def _weak(self, one: weakref.ref) -> tuple[Any, ...]:
+        """How a weak reference to what is referred to, as to a layer, is written; no other can be."""
+        held = one()
+        if one.__callback__ is not None or held is None or not self.knows(held):
+            raise TypeError("cannot pickle a weak reference to what is not referred to")
+        return weakref.ref, (held,)
 
     def _first_met(self, one: Any, kind: type) -> int | None:
         if isinstance(one, types.BuiltinFunctionType):

@@ -14,12 +14,13 @@ Not seen: other state in class attributes and modules. An object that says itsel
 import copy
 import dataclasses
 import types
+import weakref
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import gymnasium as gym
 
-from irl_gym.copies.apart import held_outside, joined
+from irl_gym.copies.apart import held_outside, joined, leads_back
 from irl_gym.copies.calls import called
 from irl_gym.copies.constants import Constant, Held, Home, found_in, unchanging
 from irl_gym.copies.contents import objects_in
@@ -154,9 +155,12 @@ class Snapshots:
                 raise
             except REFUSALS:
                 self._refuses_pickle = True
-        for one in objects_in(held, self._references):
+        inside = {id(one): one for one in objects_in(held, self._references)}
+        for one in inside.values():
             if isinstance(one, types.FunctionType):
                 self._references.meet(one)
+            elif isinstance(one, weakref.ref) and id(one()) in inside and one() is not None:
+                raise leads_back("a state", one())
         return self._copied(held)
 
     def restore(self, state: Any) -> None:

@@ -126,6 +126,33 @@ def weakly(refer, follow):
     return give
 
 
+def a_weak_reference_to_itself(env):
+    env.renderer = One()
+    env.renderer.env = weakref.ref(env)
+    through(lambda self, place: setattr(self.renderer.env(), "at", place), lambda self: self.at)(env)
+
+
+def a_weak_reference_that_reset_makes(env):
+    def put(self, place):
+        if place == 0:
+            self.renderer = One()
+            self.renderer.env = weakref.ref(self)
+        self.renderer.env().at = place
+
+    env.put = types.MethodType(put, env)
+
+
+def a_weak_reference_that_a_step_makes(env):
+    def put(self, place):
+        if place == 0:
+            self.one = One()
+        elif place == 1:
+            self.weak = weakref.ref(self.one)
+        (self.one if place < 2 else self.weak()).at = place
+
+    through(put, lambda self: self.one.at)(env)
+
+
 class Copied:
     """Copies itself by what it is told to copy."""
 
@@ -287,6 +314,9 @@ JOINED = (a_dictionary_of_its_own_attributes, attributes_beside_their_object)
         closes_over_an_attribute_alone,
         logs,
         closes_over_a_lock,
+        a_weak_reference_to_itself,
+        beside_what_has_no_pickle(a_weak_reference_to_itself),
+        a_weak_reference_that_reset_makes,
         *JOINED,
         *(change(give) for give in JOINED for change in (large, made_anew_by_reset, beside_what_has_no_pickle)),
     ],
@@ -303,6 +333,7 @@ REFUSED = {
     "a list of a closure's": (Line, closes_over_a_list, "changes what the function .* holds .box., which all"),
     "a list in a list of a closure's": (Line, closes_over_a_list_of_lists, "Line.put leads to a list"),
     "a weak reference": (Line, weakly(weakref.ref, lambda ref: ref()), "Line.weak leads to a One"),
+    "a weak reference that a step makes": (Line, a_weak_reference_that_a_step_makes, "a state leads to a One"),
     "a weak proxy": (Line, weakly(weakref.proxy, lambda one: one), "Line.weak leads to a "),
     "a weak dict": (Line, weakly(lambda one: weakref.WeakValueDictionary({0: one}), lambda held: held[0]), "leads to a One"),
     "a view that copies itself": (Line, a_view_that_copies_itself, "share memory"),

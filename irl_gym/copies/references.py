@@ -19,7 +19,7 @@ import numpy as np
 from irl_gym.copies.object_graphs import ATOMS, Twin, children
 from irl_gym.copies.own_dictionaries import own, reduced
 from irl_gym.copies.replacing import changeable, held_by
-from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory
+from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory, written_as_another
 from irl_gym.errors import NotTabular
 
 
@@ -166,7 +166,7 @@ class References:
         if self._twin(one) is not None:
             raise anew(one)
         if kind not in self._holding:
-            self._holding[kind] = holds_memory(kind)
+            self._holding[kind] = holds_memory(kind) and not written_as_another(kind)
         if self._holding[kind]:
             self.memories.append(one)
         else:

@@ -61,6 +61,12 @@ def holds_memory(kind: type) -> bool:
     return issubclass(kind, (np.ndarray, np.void, *_BUFFERS)) or (torch is not None and issubclass(kind, torch.Tensor))
 
 
+def written_as_another(kind: type) -> bool:
+    """Is a pickle of such an object one of another over the same memory, made for it? So is a parameter's: of its `data`."""
+    torch: Any = sys.modules.get("torch")
+    return torch is not None and kind is torch.nn.Parameter
+
+
 def extent(one: Any) -> Extent:
     """The addresses of an object that holds memory."""
     if isinstance(one, np.ndarray):

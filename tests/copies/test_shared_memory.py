@@ -81,10 +81,28 @@ def tensors():
     return Line(pair(torch.zeros(3, 4), lambda big: big[1]), put(1, 2), lambda held: held[0][1, 2])
 
 
+def parameters(tied):
+    torch = pytest.importorskip("torch")
+    first, second = torch.nn.Linear(2, 2), torch.nn.Linear(2, 2)
+    second.weight = first.weight
+    return Line([first, second.weight if tied else second.weight.data], weigh, lambda held: held[1][0, 1].item())
+
+
+def weigh(held, value):
+    held[0].weight.data[0, 1] = value
+
+
+def test_a_parameter_of_two_modules_is_one_in_copies():
+    table = Enumeration().table(parameters(tied=True), 0.9)
+    P = table.mdp.P.toarray().reshape(N, 2, N)[: N - 1].argmax(-1)
+    assert (P.tolist(), table.evidence.exact) == ([[max(s - 1, 0), s + 1] for s in range(N - 1)], True)
+
+
 REFUSED = {
     "a bytearray": lambda: over(bytearray(4)),
     "an array.array": lambda: over(array.array("B", [0] * 4)),
     "tensors": tensors,
+    "a parameter and its data": lambda: parameters(tied=False),
     "a row of a structured array": lambda: Line(
         pair(np.zeros(3, "i4, f8"), lambda b: b[1]), put(1, "f0"), lambda h: h[0][1][0]
     ),

@@ -16,8 +16,9 @@ import gymnasium as gym
 import numpy as np
 
 from irl_gym.copies.object_graphs import ATOMS, CODE, GENERATORS, SHARED, attributes, children
+from irl_gym.copies.own_dictionaries import rejoinable
 from irl_gym.copies.replacing import held_by
-from irl_gym.copies.shared_memory import extent, holds_memory, overlap, shared
+from irl_gym.copies.shared_memory import extent, holds_memory, mapped, of_a_file, overlap, shared
 from irl_gym.errors import NotCopied
 
 
@@ -36,24 +37,39 @@ def check_apart(made: list[gym.Env], copied: list[gym.Env], memo: dict[int, Any]
     anew = {id(cell) for cell in cells}
     for name, one in _reached(made):
         if id(one) in anew or (memo.get(id(one), one) is not one and not isinstance(one, _FIXED)):
-            raise _leads_back(name, one)
-    memories, dictionaries = [], set[int]()
-    owners: dict[int, tuple[str, Any]] = {id(vars(layer)): ("", layer) for layer in copied}
+            raise leads_back(name, one)
+    memories = []
     for name, one in _reached(copied):
         if type(one) in weakref.ProxyTypes or isinstance(one, _attaching()):
-            raise _leads_back(name, one)
+            raise leads_back(name, one)
+        if mapped(one):
+            raise of_a_file(one, name)
         if holds_memory(type(one)):
             memories.append((name, one))
-        if isinstance(one, dict):
-            dictionaries.add(id(one))
-        if (own := _own_dictionary(one)) is not None and owners.setdefault(id(own), (name, one))[1] is not one:
-            raise _two_ways(name, one)
-    for twice in owners.keys() & dictionaries:
-        raise _two_ways(*owners[twice])
     for where, apart in (pair for pair in memories if id(pair[1]) not in memo):
         for name, one in memories:
             if one is not apart and overlap(extent(one), extent(apart)):
                 raise shared(one, apart, f" in {name}", f" in {where}")
+
+
+def joined(layers: list[gym.Env]) -> list[Any]:
+    """The objects of which something else that layers hold holds the `__dict__` too.
+
+    Raises:
+        NotCopied: copies of one could not be joined so: a layer, one of two with the same, one that says how it is copied.
+    """
+    dictionaries = set[int]()
+    owners: dict[int, tuple[str, Any]] = {id(vars(layer)): ("", layer) for layer in layers}
+    for name, one in _reached(layers):
+        if isinstance(one, dict):
+            dictionaries.add(id(one))
+        if (own := _own_dictionary(one)) is not None and owners.setdefault(id(own), (name, one))[1] is not one:
+            raise _two_ways(name, one)
+    found = [owners[twice] for twice in owners.keys() & dictionaries]
+    for name, one in found:
+        if not rejoinable(type(one)):
+            raise _two_ways(name, one)
+    return [one for _, one in found]
 
 
 def held_outside(layers: list[gym.Env]) -> list[tuple[str, Any]]:
@@ -118,7 +134,8 @@ def inside(value: Any) -> list[Any]:
     return [one for one in seen.values() if type(one) not in ATOMS and not isinstance(one, _OWN)]
 
 
-def _leads_back(name: str, one: Any) -> NotCopied:
+def leads_back(name: str, one: Any) -> NotCopied:
+    """The error for what leads to an original from a copy, and the attribute by which it does."""
     mend = "Make it a tuple, if it never changes; or make" if isinstance(one, list) else "Make"
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "

@@ -9,15 +9,17 @@ import copyreg
 import io
 import pickle
 import types
-from collections.abc import Callable, Iterator, Mapping
+import weakref
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from irl_gym.copies.object_graphs import ATOMS, Twin, children
+from irl_gym.copies.own_dictionaries import own, reduced
 from irl_gym.copies.replacing import changeable, held_by
-from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory
+from irl_gym.copies.shared_memory import Sharing, blocks, holds_memory, written_as_another
 from irl_gym.errors import NotTabular
 
 
@@ -49,11 +51,16 @@ class References:
 
         methods = {**copyreg.dispatch_table, types.MethodType: lambda one: (types.MethodType, (one.__func__, one.__self__))}
         methods |= dict.fromkeys((np.void, np.record), lambda one: (np.ndarray.__getitem__, (np.array(one).copy(), ())))
-        own = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
+        methods[weakref.ref] = self._weak
+        parts = {"persistent_id": staticmethod(self._lookup()), "dispatch_table": methods}  # by name it may be another method
+        self._methods = methods
+        self.joined: set[type] = set()
+        """Types of objects whose `__dict__` may be held in another way too."""
+
         self.functions: list[types.FunctionType] = []
         """Functions that were met and that hold objects, none of which is in a pickle."""
 
-        self._pickler = type("Pickler", (pickle.Pickler,), own)
+        self._pickler = type("Pickler", (pickle.Pickler,), parts)
         self._sharing = type("Sharing", (self._pickler,), {"reducer_override": lambda pickler, one: pickler.reduced(one)})
         self._unpickler = type("Unpickler", (pickle.Unpickler,), {"persistent_load": self.objects.__getitem__})
 
@@ -80,6 +87,11 @@ class References:
         self.objects.append(one)
         return len(self.objects) - 1
 
+    def join(self, kind: type) -> None:
+        """Have what is loaded of objects of this type hold, as their `__dict__`, the very dictionary that others hold."""
+        self.joined.add(kind)
+        self._methods[kind] = reduced
+
     def meet(self, one: types.FunctionType) -> None:
         """Refer to a function, as if a pickle had met it."""
         if not self.knows(one):
@@ -98,7 +110,7 @@ class References:
                 continue
             if one is value or (type(one) not in ATOMS and not isinstance(one, tuple | frozenset | np.generic)):
                 self.refer(one)
-            for part in (*children(one), *held_by(one)):
+            for part in (*children(one), *held_by(one), *own(one, self.joined)):
                 if type(part) not in ATOMS and id(part) not in seen:
                     seen.add(id(part))
                     waiting.append(part)
@@ -135,6 +147,13 @@ class References:
 
         return persistent_id
 
+    def _weak(self, one: weakref.ref) -> tuple[Any, ...]:
+        """How a weak reference to what is referred to, as to a layer, is written; no other can be."""
+        held = one()
+        if one.__callback__ is not None or held is None or not self.knows(held):
+            raise TypeError("cannot pickle a weak reference to what is not referred to")
+        return weakref.ref, (held,)
+
     def _first_met(self, one: Any, kind: type) -> int | None:
         if isinstance(one, types.BuiltinFunctionType):
             return self.refer(one) if isinstance(one.__self__, types.ModuleType | None) else None
@@ -147,7 +166,7 @@ class References:
         if self._twin(one) is not None:
             raise anew(one)
         if kind not in self._holding:
-            self._holding[kind] = holds_memory(kind)
+            self._holding[kind] = holds_memory(kind) and not written_as_another(kind)
         if self._holding[kind]:
             self.memories.append(one)
         else:
@@ -155,11 +174,11 @@ class References:
         return None
 
 
-def twins(one: Any, other: Any) -> dict[int, Any] | None:
+def twins(one: Any, other: Any, joined: Collection[type]) -> dict[int, Any] | None:
     """The id of each object inside a value -> what is in its place inside another; None where that is built otherwise."""
     found, waiting = {id(one): other}, [(one, other)]
     while waiting:
-        first, second = ([*children(value)] for value in waiting.pop())
+        first, second = ([*children(value), *own(value, joined)] for value in waiting.pop())
         if len(first) != len(second):
             return None
         for a, b in zip(first, second, strict=True):

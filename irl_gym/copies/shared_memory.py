@@ -9,6 +9,7 @@ at the same offset.
 import array
 import copy
 import ctypes
+import mmap
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -58,6 +59,12 @@ def holds_memory(kind: type) -> bool:
     """Are objects of this type memory that another object may share?"""
     torch: Any = sys.modules.get("torch")  # whoever holds a tensor has imported it
     return issubclass(kind, (np.ndarray, np.void, *_BUFFERS)) or (torch is not None and issubclass(kind, torch.Tensor))
+
+
+def written_as_another(kind: type) -> bool:
+    """Is a pickle of such an object one of another over the same memory, made for it? So is a parameter's: of its `data`."""
+    torch: Any = sys.modules.get("torch")
+    return torch is not None and kind is torch.nn.Parameter
 
 
 def extent(one: Any) -> Extent:
@@ -117,6 +124,27 @@ def shared(one: Any, other: Any, *where: str) -> NotCopied:
     )
 
 
+def mapped(one: Any) -> bool:
+    """Is an array's memory a file's (or of processes that share it), so that what is written to it is read elsewhere too?"""
+    while isinstance(one, np.ndarray | memoryview):
+        if isinstance(one, np.memmap) and one.mode is not None:
+            return one.mode in ("r+", "w+")
+        if isinstance(one, memoryview) and one.readonly:
+            return False
+        one = one.obj if isinstance(one, memoryview) else one.base
+    return isinstance(one, mmap.mmap) and not memoryview(one).readonly
+
+
+def of_a_file(one: Any, where: str = "an attribute") -> NotCopied:
+    """The error for memory that is a file's, and the attribute that leads there, if that is known."""
+    return NotCopied(
+        f"{where} leads to {_told(one)} that writes to a file (numpy.memmap in mode 'r+', say), which copies of it would not: "
+        "expected arrays whose memory is their own. Load it in __init__, as by numpy.array(...) of it; open it with mode='r' "
+        "where it is only read, or 'c' where no other reads the file; or give the environment get_state() and "
+        "set_state(state)."
+    )
+
+
 def _told(one: Any) -> str:
     shape = getattr(one, "shape", None)
     return f"a {type(one).__module__}.{type(one).__name__}" + (f" of shape {tuple(shape)}" if shape is not None else "")
@@ -152,13 +180,17 @@ def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T
 
 
 def _met(memo: Any) -> Iterator[Any]:
-    """What holds memory among all that was copied with a memo: `copy.deepcopy` keeps it alive there."""
-    alive = memo.get(id(memo))
-    for one in alive if isinstance(alive, list) else ():
+    """What holds memory among all that was copied with a memo."""
+    return (one for one in alive(memo) if holds_memory(type(one)))
+
+
+def alive(memo: Any) -> Iterator[Any]:
+    """All that was copied with a memo: `copy.deepcopy` keeps it alive there."""
+    kept = memo.get(id(memo))
+    for one in kept if isinstance(kept, list) else ():
         if type(one) is dict:
-            yield from _met(one)  # the memo of a layer
-        elif holds_memory(type(one)):
-            yield one
+            yield from alive(one)  # the memo of a layer
+        yield one
 
 
 class Sharing:

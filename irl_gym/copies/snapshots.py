@@ -14,12 +14,13 @@ Not seen: other state in class attributes and modules. An object that says itsel
 import copy
 import dataclasses
 import types
+import weakref
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import gymnasium as gym
 
-from irl_gym.copies.apart import held_outside
+from irl_gym.copies.apart import held_outside, joined, leads_back
 from irl_gym.copies.calls import called
 from irl_gym.copies.constants import Constant, Held, Home, found_in, unchanging
 from irl_gym.copies.contents import objects_in
@@ -35,9 +36,10 @@ from irl_gym.copies.object_graphs import (
     put,
     reached,
 )
+from irl_gym.copies.own_dictionaries import rejoin
 from irl_gym.copies.references import References, twins
 from irl_gym.copies.replacing import held_by, replace_generators
-from irl_gym.copies.shared_memory import copied, extent, overlap
+from irl_gym.copies.shared_memory import alive, copied, extent, mapped, of_a_file, overlap
 from irl_gym.copies.stripped import awaken_generators, duplicate, layers
 from irl_gym.errors import InvalidParameter, NotCopied, NotEnumerable, NotTabular
 
@@ -73,6 +75,9 @@ class Snapshots:
         self._stand_ins = replace_generators(env, twin)
         self._references = References(twin, (*CODE, gym.Space))
         self._guard = References(twin, (*CODE, gym.Space))
+        for one in [] if rehearsal is None else joined(self._layers):
+            self._guard.join(type(one))
+            self._references.join(type(one))
         self._refuses_pickle = False
         self._places = [LayerState(layer) for layer in self._layers if layer is not self._own]
         self._refer_to_parts(self._guard)
@@ -88,6 +93,7 @@ class Snapshots:
         Raises:
             ConstantChanged: something else is in the place of a constant, or shares its memory: `include` it, and start again.
             NotTabular: the environment made a new generator, or holds what cannot be copied.
+            NotCopied: it holds memory of a file.
         """
         again: dict[int, Any] = {}
         for one in self._constants:
@@ -98,9 +104,12 @@ class Snapshots:
             state, memories = self._taken()
             if self._hold():
                 state, memories = self._taken()
-        for memory in map(extent, memories):
+        for memory in memories:
+            if mapped(memory):
+                raise of_a_file(memory)
+            at = extent(memory)
             for one in self._constants:
-                if any(overlap(memory, other) for other in one.extents):
+                if any(overlap(at, other) for other in one.extents):
                     raise ConstantChanged(one.home.name)
         return state
 
@@ -129,7 +138,7 @@ class Snapshots:
 
     def _again(self, one: Constant, now: Any) -> dict[int, Any]:
         """What a constant that was built anew with the same contents stands for, part by part."""
-        found = twins(now, one.value) if one.unchanged() else None
+        found = twins(now, one.value, self._references.joined) if one.unchanged() else None
         if found is None:
             raise ConstantChanged(one.home.name)
         return found
@@ -146,9 +155,12 @@ class Snapshots:
                 raise
             except REFUSALS:
                 self._refuses_pickle = True
-        for one in objects_in(held, self._references):
+        inside = {id(one): one for one in objects_in(held, self._references)}
+        for one in inside.values():
             if isinstance(one, types.FunctionType):
                 self._references.meet(one)
+            elif isinstance(one, weakref.ref) and id(one()) in inside and one() is not None:
+                raise leads_back("a state", one())
         return self._copied(held)
 
     def restore(self, state: Any) -> None:
@@ -230,7 +242,8 @@ class Snapshots:
     def _copied(self, held: Any) -> tuple["_Copy", list[Any]]:
         """A deep copy as a state, and what holds memory in it."""
         try:
-            made, memories, _ = copied(lambda memo: copy.deepcopy(held, memo), self._references.memo())
+            made, memories, memo = copied(lambda memo: copy.deepcopy(held, memo), self._references.memo())
+            rejoin((one for one in alive(memo) if type(one) in self._references.joined), memo)
         except NotCopied:
             raise
         except REFUSALS as error:

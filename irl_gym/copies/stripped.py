@@ -7,13 +7,15 @@ so that an attribute that cannot be copied is named.
 """
 
 import copy
+import weakref
 from typing import Any
 
 import gymnasium as gym
 from gymnasium.wrappers import TimeLimit
 
-from irl_gym.copies.apart import check_apart, held_outside, inside
+from irl_gym.copies.apart import check_apart, held_outside, inside, joined
 from irl_gym.copies.object_graphs import SHARED, attributes, children
+from irl_gym.copies.own_dictionaries import rejoin
 from irl_gym.copies.replacing import renew_functions
 from irl_gym.copies.shared_memory import copied
 from irl_gym.errors import NotCopied
@@ -78,6 +80,7 @@ def _apart(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, Any]) -> g
     known = memo | {id(one): one for _, value in held_outside(kept) for one in inside(value)}
     made, _, memo = copied(lambda told: _layers_copied(kept, chain, told), known)
     if made.unwrapped is not chain[-1]:  # else it speaks for itself
+        rejoin(joined(kept), memo)
         cells = renew_functions(made, memo)
         check_apart(layers(made), kept, memo, cells)
     return made
@@ -88,7 +91,7 @@ def _layers_copied(kept: list[gym.Env], chain: list[gym.Env], memo: dict[int, An
     current: gym.Env = chain[-1]
     for layer in reversed(chain):
         if not any(layer is one for one in kept):
-            memo[id(layer)] = current
+            memo |= {id(layer): current} | _weakly(layer, current)
         elif id(layer) not in memo:  # else it is used as it is
             current = _copied_layer(layer, memo)
     return current
@@ -99,7 +102,7 @@ def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
     if hasattr(kind, "__deepcopy__"):
         return _whole(layer, memo)
     made: Any = object.__new__(kind)
-    tried = memo | {id(layer): made}
+    tried = memo | {id(layer): made} | _weakly(layer, made)
     try:
         for name, value in attributes(layer).items():
             object.__setattr__(made, name, _copied_attribute(layer, name, value, tried))
@@ -114,6 +117,12 @@ def _copied_layer(layer: gym.Env, memo: dict[int, Any]) -> Any:
     memo.update(tried)
     memo.setdefault(id(memo), []).append(tried)  # deepcopy knows `tried` by its address, which may not be given to another dict
     return made
+
+
+def _weakly(layer: gym.Env, made: gym.Env) -> dict[int, Any]:
+    """For `copy.deepcopy`: weak references to a layer, as a renderer holds one, lead to its copy."""
+    plain = (one for one in weakref.getweakrefs(layer) if type(one) is weakref.ref and one.__callback__ is None)
+    return {id(one): weakref.ref(made) for one in plain}
 
 
 def _whole(layer: gym.Env, memo: dict[int, Any]) -> Any:

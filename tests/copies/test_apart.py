@@ -126,6 +126,33 @@ def weakly(refer, follow):
     return give
 
 
+def a_weak_reference_to_itself(env):
+    env.renderer = One()
+    env.renderer.env = weakref.ref(env)
+    through(lambda self, place: setattr(self.renderer.env(), "at", place), lambda self: self.at)(env)
+
+
+def a_weak_reference_that_reset_makes(env):
+    def put(self, place):
+        if place == 0:
+            self.renderer = One()
+            self.renderer.env = weakref.ref(self)
+        self.renderer.env().at = place
+
+    env.put = types.MethodType(put, env)
+
+
+def a_weak_reference_that_a_step_makes(env):
+    def put(self, place):
+        if place == 0:
+            self.one = One()
+        elif place == 1:
+            self.weak = weakref.ref(self.one)
+        (self.one if place < 2 else self.weak()).at = place
+
+    through(put, lambda self: self.one.at)(env)
+
+
 class Copied:
     """Copies itself by what it is told to copy."""
 
@@ -169,6 +196,35 @@ class Attributes(dict):
 def a_dictionary_of_its_own_attributes(env):
     env.one = Attributes(at=0)
     through(lambda self, place: setattr(self.one, "at", place), lambda self: self.one["at"])(env)
+
+
+def attributes_beside_their_object(env):
+    env.one = One()
+    env.one.at = 0
+    env.mine = vars(env.one)
+    through(lambda self, place: self.mine.__setitem__("at", place), lambda self: self.one.at)(env)
+
+
+def large(give):
+    def both(env):
+        give(env)
+        env.one.places = list(range(400))
+
+    return both
+
+
+def made_anew_by_reset(give):
+    def both(env):
+        def put(self, place):
+            if place == 0:
+                give(self)
+                self.one.places, self.put = list(range(400)), types.MethodType(put, self)
+            self.one.at = place
+
+        give(env)
+        env.put = types.MethodType(put, env)
+
+    return both
 
 
 def its_own_attributes(env):
@@ -243,6 +299,9 @@ def of_the_class(env):
     env.put = types.MethodType(lambda self, place: self.mine[0].__setitem__(0, place), env)
 
 
+JOINED = (a_dictionary_of_its_own_attributes, attributes_beside_their_object)
+
+
 @pytest.mark.parametrize(
     "give",
     [
@@ -255,6 +314,11 @@ def of_the_class(env):
         closes_over_an_attribute_alone,
         logs,
         closes_over_a_lock,
+        a_weak_reference_to_itself,
+        beside_what_has_no_pickle(a_weak_reference_to_itself),
+        a_weak_reference_that_reset_makes,
+        *JOINED,
+        *(change(give) for give in JOINED for change in (large, made_anew_by_reset, beside_what_has_no_pickle)),
     ],
 )
 def test_a_function_that_holds_the_environment_holds_its_copy_in_a_copy(give):
@@ -269,12 +333,12 @@ REFUSED = {
     "a list of a closure's": (Line, closes_over_a_list, "changes what the function .* holds .box., which all"),
     "a list in a list of a closure's": (Line, closes_over_a_list_of_lists, "Line.put leads to a list"),
     "a weak reference": (Line, weakly(weakref.ref, lambda ref: ref()), "Line.weak leads to a One"),
+    "a weak reference that a step makes": (Line, a_weak_reference_that_a_step_makes, "a state leads to a One"),
     "a weak proxy": (Line, weakly(weakref.proxy, lambda one: one), "Line.weak leads to a "),
     "a weak dict": (Line, weakly(lambda one: weakref.WeakValueDictionary({0: one}), lambda held: held[0]), "leads to a One"),
     "a view that copies itself": (Line, a_view_that_copies_itself, "share memory"),
     "a variable that is set": (Line, sets_a_variable, "changes what the function .*put holds .at., which all copies share"),
     "its own attributes": (Line, its_own_attributes, "whose __dict__ is held in another way too"),
-    "a dictionary of its own attributes": (Line, a_dictionary_of_its_own_attributes, "Line.one leads to a Attributes whose"),
     "attributes of two objects": (Line, attributes_of_two, "leads to a One whose __dict__ is held in another way too"),
     "memory that processes share": (Line, shared_memory, "Line.memory leads to a SharedMemory"),
     "a variable that is set beside what has no pickle": (

@@ -1,6 +1,7 @@
 """What is written through one array and read through another, which shares its memory, is the same in a copy."""
 
 import array
+import mmap
 
 import gymnasium as gym
 import numpy as np
@@ -80,10 +81,28 @@ def tensors():
     return Line(pair(torch.zeros(3, 4), lambda big: big[1]), put(1, 2), lambda held: held[0][1, 2])
 
 
+def parameters(tied):
+    torch = pytest.importorskip("torch")
+    first, second = torch.nn.Linear(2, 2), torch.nn.Linear(2, 2)
+    second.weight = first.weight
+    return Line([first, second.weight if tied else second.weight.data], weigh, lambda held: held[1][0, 1].item())
+
+
+def weigh(held, value):
+    held[0].weight.data[0, 1] = value
+
+
+def test_a_parameter_of_two_modules_is_one_in_copies():
+    table = Enumeration().table(parameters(tied=True), 0.9)
+    P = table.mdp.P.toarray().reshape(N, 2, N)[: N - 1].argmax(-1)
+    assert (P.tolist(), table.evidence.exact) == ([[max(s - 1, 0), s + 1] for s in range(N - 1)], True)
+
+
 REFUSED = {
     "a bytearray": lambda: over(bytearray(4)),
     "an array.array": lambda: over(array.array("B", [0] * 4)),
     "tensors": tensors,
+    "a parameter and its data": lambda: parameters(tied=False),
     "a row of a structured array": lambda: Line(
         pair(np.zeros(3, "i4, f8"), lambda b: b[1]), put(1, "f0"), lambda h: h[0][1][0]
     ),
@@ -110,6 +129,46 @@ def test_a_table_of_pandas_and_its_column_are_named_and_a_copy_of_the_column_men
     with pytest.raises(NotCopied, match=r"in Line\.column and .* in Line\.table share memory"):
         Enumeration().table(line(False), 0.9)
     assert Enumeration().table(line(True), 0.9).evidence.exact
+
+
+def two_of_a_file(path, mode):
+    return [np.memmap(path, np.uint8, mode, shape=(4,)), np.memmap(path, np.uint8, mode, shape=(4,))]
+
+
+MAPPED = {
+    "two of a file": lambda path: two_of_a_file(path, "r+"),
+    "a part as a plain array": lambda path: [np.asarray(one)[:1] for one in two_of_a_file(path, "w+")],
+    "a buffer": lambda path: [np.frombuffer(mmap.mmap(-1, 4), np.uint8)] * 2,
+}
+
+
+@pytest.mark.parametrize("name", MAPPED)
+def test_an_array_that_writes_to_a_file_is_refused_by_name(name, tmp_path):
+    (tmp_path / "held").write_bytes(bytes(4))
+    with pytest.raises(NotCopied, match=r"Line\.held leads to a .* that writes to a file .* Load it in __init__"):
+        Enumeration().table(Line(MAPPED[name](tmp_path / "held"), put(1, 0), lambda held: held[0][0]), 0.9)
+
+
+def test_an_array_that_writes_to_a_file_is_refused_when_a_step_opens_it(tmp_path):
+    (tmp_path / "held").write_bytes(bytes(4))
+    env, snapshots = snapshots_of(Walk(row=None))
+    env.row = np.memmap(tmp_path / "held", np.uint8, "r+")
+    with pytest.raises(NotCopied, match="that writes to a file"):
+        snapshots.take()
+
+
+MENDED = {
+    "loaded": lambda path: [np.array(np.memmap(path, np.uint8, "r+"))],
+    "written to in memory": lambda path: [np.memmap(path, np.uint8, "c")],
+    "read alone": lambda path: [np.zeros(1, int), np.memmap(path, np.uint8, "r")],
+}
+
+
+@pytest.mark.parametrize("name", MENDED)
+def test_a_file_that_is_loaded_or_not_written_to_is_none_to_refuse(name, tmp_path):
+    (tmp_path / "held").write_bytes(bytes(4))
+    table = Enumeration().table(Line(MENDED[name](tmp_path / "held"), put(0, 0), lambda held: held[0][0]), 0.9)
+    assert (table.mdp.n_states, table.evidence.exact) == (N, True)
 
 
 class Told(Line):

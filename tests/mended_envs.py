@@ -51,8 +51,8 @@ class Set(Told):
 
 
 def of_a_function(env):
-    box = env.box
-    env.put = lambda cell: box.__setitem__(0, cell)
+    boxes = [env.box]
+    env.put = lambda cell: boxes[0].__setitem__(0, cell)
 
 
 SHARED = [0]
@@ -72,6 +72,46 @@ def of_a_buffer(env):
 def of_one(env):
     env.box = bytearray(4)
     env.see = types.MethodType(lambda self: int(np.frombuffer(self.box, np.uint8)[0]), env)
+
+
+def of_a_copy(env):
+    env.names = bytearray(b"abcd")
+    env.seen = np.frombuffer(bytes(env.names), np.uint8).copy()
+
+
+def of_its_attributes(env):
+    env.mine = vars(env)
+    env.put = types.MethodType(lambda self, cell: self.mine.__setitem__("box", [cell]), env)
+
+
+def of_itself(env):
+    env.put = types.MethodType(lambda self, cell: vars(self).__setitem__("box", [cell]), env)
+
+
+class Names(dict):
+    """A dictionary whose entries are read as attributes."""
+
+    def __getattr__(self, name):
+        if name not in self:
+            raise AttributeError(name)
+        return self[name]
+
+
+def of_a_dictionary(env):
+    env.box = Names(cell=0)
+    env.put, env.see = (
+        types.MethodType(one, env) for one in (lambda self, cell: self.box.update(cell=cell), lambda self: self.box.cell)
+    )
+
+
+def of_a_file(path, mode, load=lambda held: held):
+    """One that keeps an array of a file, in memory once it was loaded; the file is there for who only reads."""
+    (path / "held").write_bytes(bytes(8))
+
+    def give(env):
+        env.held = load(np.memmap(path / "held", np.uint8, mode, shape=(8,)))
+
+    return give
 
 
 def locked(env):

@@ -136,10 +136,9 @@ def inside(value: Any) -> list[Any]:
 
 def leads_back(name: str, one: Any) -> NotCopied:
     """The error for what leads to an original from a copy, and the attribute by which it does."""
-    mend = "Make it a tuple, if it never changes; or make" if isinstance(one, list) else "Make"
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "
-        f"variable or a weak reference, which copies share: expected all that changes in attributes alone. {mend} the "
+        f"variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
         "function a method that uses `self`; or give the environment get_state() and set_state(state)."
     )
 

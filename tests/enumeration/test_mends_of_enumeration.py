@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from enumeration_envs import Board, Corridor, Shows
-from gymnasium.wrappers import FilterObservation, TimeAwareObservation, TimeLimit
+from gymnasium.wrappers import TimeAwareObservation, TimeLimit
 from mended import GAMMA, done, mends, told, unsaid
 from mended_envs import (
     Breaks,
@@ -24,7 +24,12 @@ from mended_envs import (
     Told,
     locked,
     of_a_buffer,
+    of_a_copy,
+    of_a_dictionary,
+    of_a_file,
     of_a_function,
+    of_its_attributes,
+    of_itself,
     of_one,
     of_the_module,
 )
@@ -134,9 +139,16 @@ CASES = [
     ("Give the environment its own generator back.",
      lambda path: stand_in()[1].random(), lambda path: stand_in()[2].random()),
     # copies
-    ("Make it a tuple, if it never changes; or make the function a method that uses `self`; or " + SET_STATE,
-     lambda path: table(FilterObservation(DICT, ["cell"])), lambda path: table(FilterObservation(DICT, ("cell",))),
-     lambda path: told(lambda: table(Told(of_a_function))) and table(Told()), lambda path: table(Set(of_a_function))),
+    ("Make the function a method that uses `self`; or " + SET_STATE, lambda path: table(Told(of_a_function)),
+     lambda path: table(Told()), lambda path: table(Set(of_a_function))),
+    ("Hold the object, and write vars(...) of it where that is needed; give a dictionary a __getattr__ in the place of "
+     "`self.__dict__ = self`; or " + SET_STATE, lambda path: table(Told(of_its_attributes)),
+     lambda path: table(Told(of_itself)), lambda path: table(Told(of_a_dictionary)),
+     lambda path: table(Set(of_its_attributes))),
+    ("Load it in __init__, as by numpy.array(...) of it; open it with mode='r' where it is only read, or 'c' where no other "
+     "reads the file; or " + SET_STATE, lambda path: table(Told(of_a_file(path, "w+"))),
+     lambda path: table(Told(of_a_file(path, "w+", np.array))), lambda path: table(Told(of_a_file(path, "r"))),
+     lambda path: table(Told(of_a_file(path, "c"))), lambda path: table(Set(of_a_file(path, "w+")))),
     ("Mend the environment.", lambda path: table(Fails()), lambda path: table(Fails((0, 1)))),
     ("Keep it in one that __init__ or reset makes; make a function that needs it a method that uses `self`.",
      lambda path: table(OfTheModule(of_the_module)), lambda path: table(Told())),
@@ -144,8 +156,9 @@ CASES = [
      "environment, make it in __init__, and anew in reset only for a seed.",
      lambda path: table(Renews(True)), lambda path: table(Renews(False)),
      lambda path: irl_gym.tabulate(Renews(True), gamma=GAMMA, by=Interaction(500))),
-    ("Hold one of them, and make the other where it is needed; or " + SET_STATE,
-     lambda path: table(Told(of_a_buffer)), lambda path: table(Told(of_one)), lambda path: table(Set(of_a_buffer))),
+    ("Hold one of them, and make the other where it is needed; hold a copy of it where neither changes; or " + SET_STATE,
+     lambda path: table(Told(of_a_buffer)), lambda path: table(Told(of_one)), lambda path: table(Told(of_a_copy)),
+     lambda path: table(Set(of_a_buffer))),
     ("Make it in __init__ or reset, and " + SET_STATE,
      lambda path: table(Late()), lambda path: table(LateAndSet(sooner=True))),
     ("Give it get_state() and set_state(state), or mend its __deepcopy__.",

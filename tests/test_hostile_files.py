@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fuzz.readers import write_experts, write_linear, write_path, write_search
+from fuzz.experts import write_experts
+from fuzz.readers import write_linear, write_path, write_search
 from gymnasium import spaces
 
 from irl_gym.ambiguity.lambda_path import LambdaPath

@@ -106,7 +106,8 @@ def test_short_calls_and_calls_without_a_limit_start_no_child():
 
 
 SCRIPT = """
-import os, sys, threading, time
+import os, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background of a shell it is ignored
 from irl_gym.deadline import Deadline
 from irl_gym.killable import called, within
 
@@ -123,7 +124,10 @@ def test_a_child_ends_with_its_parent_in_a_script_without_a_guard(how):
         child = int(parent.stdout.readline())
         time.sleep(0.2)
         parent.send_signal(how)
-        assert parent.wait(60) != 0
+        try:
+            assert parent.wait(60) != 0
+        finally:
+            parent.kill()
     for _ in range(600):
         if _ended(child):
             return

@@ -204,7 +204,7 @@ def test_value_iteration_says_what_to_do_when_coordinates_have_no_table():
 
 
 def test_value_iteration_says_what_to_do_when_an_environment_hides_something():
-    with pytest.raises(NotTabular, match=r"a natural.*`Reveal\(env\)`.*plan with SB3"):
+    with pytest.raises(NotTabular, match=r"a natural.*reveal.Reveal\(env\).*plan with SB3"):
         _ = Simulator(gym.make("Blackjack-v1"), ValueIteration(), GAMMA).known
 
 

@@ -138,7 +138,7 @@ def leads_back(name: str, one: Any) -> NotCopied:
     """The error for what leads to an original from a copy, and the attribute by which it does."""
     return NotCopied(
         f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "
-        f"variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
+        "variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
         "function a method that uses `self`; or give the environment get_state() and set_state(state)."
     )
 

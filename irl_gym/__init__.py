@@ -4,7 +4,8 @@
     TabularMDP(P, gamma, d0)                  the same from arrays
     value_iteration, policy_iteration         optimal policies of a table
     discretize(env, gamma=..., bins=...)      a continuous environment as a table of cells
-    FiniteLP().fit(mdp, expert)               a reward under which the expert is optimal, with a Certificate
+    FiniteLP().fit(mdp, expert)               a reward under which the expert is optimal, with a proof of its program
+    certify(mdp, expert, reward)              what any reward says of an expert: is it optimal, by what margins, and where not
     FeatureLP(phi).fit(mdp, expert)           the same as a LinearReward, alpha . phi, for large state spaces
     TrajectoryLP(phi).fit(Simulator(env, planner, gamma), episodes)     from the expert's episodes alone
     worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns

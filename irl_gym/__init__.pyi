@@ -1,4 +1,3 @@
-from .certificate import certify as certify
 from .datasets import read_minari as read_minari
 from .datasets import write_minari as write_minari
 from .demonstrations import collect as collect
@@ -10,6 +9,7 @@ from .dynamic_programming import policy_iteration as policy_iteration
 from .dynamic_programming import value_iteration as value_iteration
 from .errors import IrlGymError as IrlGymError
 from .experiment import Experiment as Experiment
+from .facts import Fact as Fact
 from .learners.base import IRLResult as IRLResult
 from .learners.feature import FeatureLP as FeatureLP
 from .learners.finite import FiniteLP as FiniteLP
@@ -17,6 +17,8 @@ from .learners.trajectory import TrajectoryLP as TrajectoryLP
 from .linear_reward import LinearReward as LinearReward
 from .mdp import TabularMDP as TabularMDP
 from .metrics import worst_tie as worst_tie
+from .optimality import Optimality as Optimality
+from .optimality import certify as certify
 from .pipeline import recover_and_retrain as recover_and_retrain
 from .planners import SB3 as SB3
 from .planners import ValueIteration as ValueIteration

@@ -149,7 +149,7 @@ class Learning:
     inner: Annotated[PlannerName | None, UNSET] = None
     """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
     time_limit: Annotated[float | None, UNSET] = None
-    """Seconds for the whole of the learner's work, its certificate included; the default is no limit."""
+    """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
 
     @property
     def cap(self) -> float | Literal["auto"] | None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from irl_gym._typing import Matrix, Sparse
+from irl_gym._typing import Indices, Matrix, Sparse
 from irl_gym.mdp import TabularMDP, TransitionTable, entry_rows
 from irl_gym.policies import as_distribution
 from irl_gym.sampling_error import SamplingError, sampling_error
@@ -44,6 +44,10 @@ class Comparisons:
         """(n,) the two actions have the same successors: no reward on states can tell them apart."""
         difference = abs(self.rows)
         return np.asarray(difference.max(axis=1).todense()).ravel() <= SAME_SUCCESSORS
+
+    def pairs(self, rows: Indices, which: np.ndarray) -> np.ndarray:
+        """(k, 2) state and action of some rows, where `rows` (S,) says which state of a whole table each state is."""
+        return np.stack([rows[self.states[which]], self.actions[which]], axis=1).astype(np.int64)
 
     @property
     def caveat(self) -> str:

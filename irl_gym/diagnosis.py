@@ -3,7 +3,7 @@
     print(doctor(FiniteLP(l1=5.0).fit(mdp, expert), mdp, expert))
 
 Each sentence is one function in `irl_gym.diagnoses`. It recomputes what it claims from P, the expert and R, and asks the
-certificate only for what that alone knows; a mend is tried where it is a program that is quick to solve.
+proof only for what that alone knows; a mend is tried where it is a program that is quick to solve.
 """
 
 import os
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from irl_gym.certificates import claims_in
 from irl_gym.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Diagnosis as Diagnosis
@@ -99,14 +100,14 @@ def doctor(
     mdp = None if mdp is None else checked_mdp(mdp)
     learned = result if isinstance(result, IRLResult) else None
     if learned is None and mdp is None:
-        what = "None" if result is None else f"a {type(result).__name__}, a reward without a certificate,"
+        what = "None" if result is None else f"a {type(result).__name__}, a reward without a proof,"
         raise InvalidParameter(f"result is {what} and mdp is None: expected a result, a table, or both.")
     reward = result if learned is None else learned.reward
     case = Case(
         mdp,
         None if mdp is None else expert,
         None if reward is None or mdp is None else _tabular(reward, mdp, states),
-        {} if learned is None else learned.certificate.to_json(),
+        {} if learned is None else learned.proof.to_json(),
         "" if learned is None else learned.status.value,
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
@@ -142,7 +143,7 @@ def diagnose(case: Case) -> Diagnosis:
 def _examined(case: Case) -> str:
     """What was looked at."""
     if case.mdp is None:
-        return "There is no table: only what the certificate says was examined."
+        return "There is no table: only what the proof says was examined."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
     where += ", on a counted table" if case.counted else ""
     beyond = case.beyond.copy()
@@ -166,7 +167,7 @@ def diagnose_run(run: "Run") -> Diagnosis:
         DatasetMissing: the demonstrations of an expert with noise are gone.
     """
     reward: Mapping[str, Any] = run.stages.get("reward", {})
-    table, claims = run.table, run.certificate
+    table, claims = run.table, claims_in(run.certificate)
     if table is None:
         stats = reward.get("stats", {})
         return diagnose(

@@ -10,6 +10,7 @@ import numpy as np
 
 from irl_gym import metrics
 from irl_gym._typing import ActionSets
+from irl_gym.certificates import claims_in
 from irl_gym.confirmation import loss_by_episodes, value_by_episodes
 from irl_gym.curves import Curve, read_curve, two_returns
 from irl_gym.demonstrations import Episode
@@ -21,8 +22,8 @@ from irl_gym.errors import NotTabular, UndefinedDistance
 from irl_gym.estimated import evidence_told
 from irl_gym.howard import Optimum
 from irl_gym.intervals import mean_interval
+from irl_gym.loss import loss_of
 from irl_gym.mdp import TabularMDP
-from irl_gym.optimality import loss_of
 from irl_gym.policies import as_distribution, support
 from irl_gym.rewards import TabularReward
 from irl_gym.scores import Scale, half_width
@@ -194,8 +195,9 @@ def _reward(loop: "Loop", scale: Scale) -> dict[str, Any]:
 
 def reward_told(certificate: Mapping[str, Any]) -> dict[str, Any]:
     """The certificate's numbers, and the sizes of its lists of states."""
-    sizes = {f"{key}_states": len(value) for key, value in certificate.items() if key in STATE_LISTS}
-    return sizes | {key: value for key, value in certificate.items() if not isinstance(value, list)}
+    told = claims_in(certificate)
+    sizes = {f"{key}_states": len(value) for key, value in told.items() if key in STATE_LISTS}
+    return sizes | {key: value for key, value in told.items() if not isinstance(value, list)}
 
 
 def learned_told(record: Mapping[str, Any]) -> dict[str, Any]:

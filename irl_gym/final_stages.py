@@ -14,6 +14,7 @@ import numpy as np
 
 from irl_gym.ambiguity.lambda_path import lambda_path
 from irl_gym.ambiguity.widths import feasible_widths
+from irl_gym.certificates import claims_in
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnosis import diagnose, weights_of
 from irl_gym.errors import IrlGymError
@@ -86,7 +87,7 @@ def _case(loop: "Loop") -> Case:
     """The evidence that the doctor works on, of a table or, without one, of the certificate alone."""
     made = loop.stage("reward")
     without = Case(
-        claims=loop.certificate, status=made["status"], stats=made["stats"], judged=loop.folder_metrics,
+        claims=claims_in(loop.certificate), status=made["status"], stats=made["stats"], judged=loop.folder_metrics,
         weights=weights_of(loop.learned),
     )  # fmt: skip
     if not isinstance(loop.world, TableWorld):
@@ -127,7 +128,7 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
         mdp,
         loop.known_expert,
         r_max=learner.r_max,
-        margin_cap=loop.certificate["margin_cap"],
+        margin_cap=loop.certificate["proof"]["margin_cap"],
         reward_on=learner.reward_on,
         most_pieces=MOST_PIECES,
     )

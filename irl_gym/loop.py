@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym import figures, final_stages
+from irl_gym.certificates import certificate_of, read_certificate
 from irl_gym.choices import environment_of
 from irl_gym.claims import claim, record_start, write_environment, write_version
 from irl_gym.curves import write_curve
@@ -180,7 +181,7 @@ class Loop:
     @cached_property
     def certificate(self) -> dict[str, Any]:
         """The content of certificate.json."""
-        return self.folder.load("certificate.json", read_json)
+        return self.folder.load("certificate.json", read_certificate)
 
     @cached_property
     def folder_metrics(self) -> dict[str, Any]:
@@ -236,7 +237,8 @@ class Loop:
     def _make_reward(self, folder: Path) -> dict[str, Any]:
         result = self._learn(self.experiment.learner)
         result.reward.save(folder / "reward.npz")
-        write_json(folder / "certificate.json", result.certificate.to_json())
+        known = (self.world.table, self.known_expert) if isinstance(self.world, TableWorld) else None
+        write_json(folder / "certificate.json", certificate_of(result, known, episodes=self.experiment.from_episodes))
         return {"learner": type(self.experiment.learner).__name__, **result.record()}
 
     def _learn(self, learner: Learner) -> IRLResult:
@@ -264,7 +266,7 @@ class Loop:
         """What is done to the learned reward before retraining; losses count up to the margin cap, or a typical loss."""
         if not self.shaped:
             return Unchanged()
-        return ExpectedAdvantage(self.certificate.get("margin_cap") or typical_loss(reward, mdp))
+        return ExpectedAdvantage(self.certificate["proof"].get("margin_cap") or typical_loss(reward, mdp))
 
     def _make_agent(self, folder: Path) -> dict[str, Any]:
         world, reward = self.world, self.learned
@@ -283,8 +285,7 @@ class Loop:
         return {"planner": type(planner).__name__, **_steps(policy)}
 
     def _make_metrics(self, folder: Path) -> dict[str, Any]:
-        content = evaluate(self)
-        write_json(folder / "metrics.json", content)
+        write_json(folder / "metrics.json", evaluate(self))
         return {}
 
     def _make_figures(self, folder: Path) -> dict[str, Any]:

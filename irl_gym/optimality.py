@@ -1,161 +1,253 @@
-"""Is an expert optimal under a reward? Decided by the value at stake, from the start, with all rounding.
+"""Is an expert optimal under a reward, by what margin, and in which states? Of any reward, whoever made it: `certify`.
 
-    loss = d0 . (V* - V_pi)                what the best policy earns more than the expert
-    scale = min(d0 . (V* - V_random), span of V* over the states that the expert or an optimal policy visits)
-The expert is optimal where the loss is at most `OPTIMAL_SHARE` of the scale: yes, no, or undecided where the bounds of both do
-not settle it. The smaller of the two scales counts, so that an outlier of R which only bad actions reach, or only a gamble,
-does not dilute a loss. Where V* is flat over those states, to float64 or to what the solver of R left open, their largest |V*|
-takes the place of its span, or if that is 0 to float64 too, what the terms of V* add up to without their signs (payments that
-cancel); where every action everywhere is tied there is no scale, and nothing to lose.
-Axes: S states, A actions.
+Recomputed from P, the expert and R alone: what the best policy earns more (`loss`), and row by row whether (4) of Ng & Russell
+(2000) holds. A violation or a margin counts beyond its own rounding and what the solver of R left open
+(`TabularReward.tolerance`). The margin of a row is how much more the expert's action is worth than another, Q(s, pi) - Q(s, a),
+    where the expert goes on     if it is known in every state and taken at its word: (4), with V = (I - gamma P_pi)^-1 R (5)
+    where one acts best          if it is not known in some state, or errs: then nothing is made up of what it does later
+What a learner's program says of a reward, its terms, its gap and its bound, is the learner's proof.
+Axes: S states, A actions, n rows of (4) among the reachable states.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from irl_gym._typing import ActionSets, Matrix, StateMask
-from irl_gym.discounted import EPSILON
+from irl_gym._typing import Indices, Numbers, Vector
+from irl_gym.checks import any_array
+from irl_gym.comparisons import Comparisons, as_compared, compare
 from irl_gym.dynamic_programming import optimum
-from irl_gym.howard import OUTWARDS, Optimum
-from irl_gym.mdp import TabularMDP, TransitionTable
+from irl_gym.errors import InvalidParameter
+from irl_gym.facts import Fact, aligned, counted
+from irl_gym.loss import AT_STAKE, loss_on, told_loss
+from irl_gym.margins import Margins, best_margins, comparable, least_per_state, margins_of
+from irl_gym.mdp import TabularMDP
+from irl_gym.policies import as_distribution, completed
+from irl_gym.proven import plain
+from irl_gym.rewards import TabularReward, as_reward
+from irl_gym.sampling_error import counted_table
 
-OPTIMAL_SHARE = 1e-6
-"""Share of the scale that an optimal expert may lose."""
-AT_STAKE = (
-    "At stake: what the best policy has over random actions, or if that is less, the span of its values over the states that "
-    "it or the expert visits."
-)
-"""The scale, in a sentence."""
-FLAT = 64 * EPSILON
-"""Share of |V*| below which its span is rounding."""
+ROUNDING = 1e-9
+"""Share of the largest |R| up to which rewards are the same."""
 
 
-@dataclass(frozen=True)
-class Loss:
-    """What the best policy earns more than an expert, from d0 and discounted: bounds that hold with all rounding."""
+@dataclass(frozen=True, eq=False)
+class Optimality:
+    """What a reward says of an expert. States that cannot be reached from d0 are not judged."""
 
-    low: float
-    """At least this."""
-    high: float
-    """At most this."""
-    scale_low: float
-    """What is at stake, at least; 0 where every action is tied."""
-    scale_high: float
-    """And at most."""
-    tied: bool
-    """Is every action tied in every state that is not terminal?"""
+    expert_optimal: bool | None
+    """Is the expert optimal under R? None where it is undecided: by `loss_bound`, or by what its unknown actions may lose."""
+    loss_low: float
+    """The best policy earns at least this more than the expert from d0 under R, in units of value, rounding included."""
+    loss_bound: float
+    """And at most this: in unknown states that the expert may reach, over all that it may do there."""
+    loss_share: float
+    """`loss_bound` as a share of what is at stake (`loss`); NaN where every action is tied."""
+    at_stake: float
+    """What is at stake, at most, in units of value; 0 where every action is tied."""
+    errs: bool
+    """Was the expert taken for one that may err?"""
+    worst_violation: float
+    """The largest violation of (4), in units of value; 0 when none."""
+    margin: Vector
+    """(S,) smallest margin of the expert over another action, of the rows of (4) that R can move and that were not given as
+    unbreakable; NaN where there is none."""
+    constant: bool
+    """Does R have the same value everywhere? Where episodes end it may prefer much: see `degenerate`."""
+    zero: bool
+    """Is R zero everywhere?"""
+    indifferent: bool
+    """Is the expert tied, to rounding, in every row of (4)?"""
+    unconstrained: Indices
+    """Reachable states, not terminal, where the expert is known and no action that it leaves out can be told from its own."""
+    inseparable: Indices
+    """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
+    marginless: Indices
+    """Reachable states with rows but without a positive margin under R: tied or violated."""
+    violated: Indices
+    """States with a violated row of (4)."""
+    violated_rows: np.ndarray
+    """(v, 2) state and action of each violated row: the action is worth more than the expert's under R."""
+    violations: Numbers
+    """(v,) by how much each is violated, in units of value."""
+    unknown: Indices
+    """Reachable states, not terminal, in which nothing is known of the expert: no rows, not judged."""
+    sampling_error: float | None
+    """The largest error of a margin on a counted table, of pairs that were visited; None where the table is exact."""
+    unsettled: Indices
+    """Reachable states of a counted table in which a margin above 0 is within its sampling error."""
 
     @property
-    def optimal(self) -> bool | None:
-        """Is the expert optimal? None where the bounds leave it undecided."""
-        if self.tied or self.high <= OPTIMAL_SHARE * self.scale_low:
-            return True
-        return False if self.low > OPTIMAL_SHARE * self.scale_high else None
+    def degenerate(self) -> bool:
+        """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
+        return self.zero or self.indifferent
 
     @property
-    def share(self) -> float:
-        """The loss as a share of the scale, at most; NaN where every action is tied."""
-        if self.tied:
-            return float("nan")
-        if self.high == 0:
-            return 0.0
-        return self.high / self.scale_low if self.scale_low > 0 else float("inf")
+    def tied(self) -> Indices:
+        """Reachable states in which another action is as good as the expert's, to rounding, and none is better."""
+        return np.setdiff1d(self.marginless, self.violated)
+
+    def facts(self) -> tuple[Fact, ...]:
+        """All of this, in sentences."""
+        return (*self._of_the_whole(), *self._of_states())
+
+    def _of_the_whole(self) -> Iterator[Fact]:
+        bounds = self.loss_low, self.loss_bound, self.loss_share
+        told = told_loss(self.expert_optimal, *bounds, self.unknown.size)
+        good = "plain" if self.degenerate or self.unsettled.size else "good"
+        mood = "open" if self.expert_optimal is None else good if self.expert_optimal else "bad"
+        yield Fact("expert optimal under it", told, mood)
+        if np.isfinite(self.loss_share) and self.loss_bound:
+            yield Fact("at stake", f"{self.at_stake:.4g}: {AT_STAKE}")
+        if self.sampling_error is not None:
+            yield Fact("judged on", counted_table(self.sampling_error), "open")
+        if self.degenerate:
+            yield Fact("degenerate", "R is zero" if self.zero else "R ties the expert with every action", "bad")
+        finite = self.margin[np.isfinite(self.margin)]
+        span = f"{finite.min():.3g} to {finite.max():.3g} in {counted(finite.size)}" if finite.size else "none"
+        later = "one acts best" if self.errs or self.unknown.size else "the expert goes on"
+        yield Fact("margins", f"{span}: how much better the expert's action is than the next, where {later} afterwards")
+
+    def _of_states(self) -> Iterator[Fact]:
+        if self.violated.size:
+            rows, most = counted(len(self.violated_rows), "action"), f"{self.worst_violation:.3g}"
+            told = f"in {counted(self.violated.size)} another action is better under it: {rows}, by at most {most}"
+            yield Fact("violated", told, "bad")
+        if self.tied.size and not self.zero:
+            told = f"in {counted(self.tied.size)} another action is as good as the expert's, and none better"
+            yield Fact("tied", told, "open")
+        if self.unsettled.size:
+            told = f"in {counted(self.unsettled.size)} a margin is within its sampling error, and may be noise"
+            yield Fact("left open by the counts", f"{told}; more steps to count tell", "open")
+        if self.inseparable.size:
+            told = f"in {counted(self.inseparable.size)} an action leads where the expert's own does: no reward on states tells"
+            yield Fact(
+                "cannot be settled", f"{told} them apart, one on states and actions can (--reward-on state-action)", "open"
+            )
+        if self.unconstrained.size:
+            told = f"in {counted(self.unconstrained.size)} no action that the expert leaves out can be told from its own"
+            yield Fact("without a comparison", told)
+        if self.unknown.size:
+            told = f"in {counted(self.unknown.size)} that can be reached nothing is known of it, and nothing is asked of it"
+            yield Fact("expert not seen", told)
 
     def __str__(self) -> str:
-        return told_loss(self.optimal, self.low, self.high, self.share)
+        """The facts, line by line."""
+        return aligned(self.facts())
+
+    def to_json(self) -> dict[str, Any]:
+        """As json holds it: NaN and infinity become None."""
+        return plain(self, "degenerate")
 
 
-def told_loss(optimal: bool | None, low: float, high: float | None, share: float | None, unknown: int = 0) -> str:
-    """Is the expert optimal, and what the best policy earns more, in a sentence; None and infinity where it is not known.
-
-    `unknown` is the number of states in which the expert may do anything.
-    """
-    known = high is not None and np.isfinite(high)
-    if optimal and (share is None or not np.isfinite(share)):
-        return "yes: all actions are tied"
-    if optimal:
-        return f"yes: the best policy earns at most {high:.1e} more, {share:.1e} of what is at stake" if high else "yes"
-    if optimal is None:
-        most = f"{low:.3g} to {high:.3g} more" if known else f"at least {low:.3g} more, how much is not known"
-        where = "1 state" if unknown == 1 else f"{unknown} states"
-        free = f"; the expert may do anything in {where} where it was not seen" if unknown else ""
-        return f"undecided: the best policy earns {most}{free}"
-    return f"no: the best policy earns at least {low:.3g} more"
-
-
-def told_record(record: Mapping[str, Any]) -> str | None:
-    """The same of a certificate that json held, with the rows that are violated; None where it is not judged by a loss."""
-    if record.get("loss_low") is None:
-        return None
-    bounds = record["loss_low"], record.get("loss_bound"), record.get("loss_share")
-    told = told_loss(record["expert_optimal"], *bounds, record.get("unknown_states") or 0)
-    count = record.get("violated_states")
-    where = "1 state" if count == 1 else f"{count} states"
-    return f"{told}; another action is better in {where}, by at most {record['worst_violation']:.3g}" if count else told
-
-
-def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:
-    """What an expert loses against the best policy.
+def certify(
+    mdp: TabularMDP,
+    expert: Any,
+    reward: TabularReward | np.ndarray,
+    *,
+    errs: bool = False,
+    unbreakable: Any = None,
+) -> Optimality:
+    """What a reward says of an expert, whoever made it.
 
     Args:
-        found: the optimum of a table whose states can all be reached, under the reward.
-        expert: (S, A) probabilities.
-        unknown: (S,) states in which the expert may do anything: the bounds are over all that it may do there.
+        mdp: the MDP; only states reachable from d0 are judged.
+        expert: (S,) actions, (S, A) probabilities or (S, A) set. Rows of NaN say that nothing is known of it in a state, where
+            it may do anything.
+        reward: (S,) or (S, A).
+        errs: the expert may err, as one that is known by its episodes. What follows an action is then worth what acting best
+            is, and of several actions that it takes some may be worse; otherwise all have to be as good.
+        unbreakable: (u, 2) states and actions of rows that no reward makes strict, as a program found: `margin` and
+            `marginless` leave them out, one by one.
+
+    Raises:
+        InvalidPolicy: an expert of the wrong shape or content.
+        InvalidReward: a reward of the wrong shape.
+        InvalidParameter: rows that the table does not have.
     """
-    mdp, e, nowhere = found.table.mdp, found.error, np.zeros(found.policy.size, dtype=bool)
-    below, above = found.shortfall(expert, nowhere if unknown is None else unknown)
-    low, high = _sum(mdp.d0, below - e, -1), _sum(mdp.d0, above + found.above, 1)
-    random = found.shortfall(np.full(expert.shape, 1 / expert.shape[1]), nowhere)
-    gain = max(_sum(mdp.d0, random[0] - e, -1), 0.0), _sum(mdp.d0, random[1] + found.above, 1)
-    span = _span(found, expert)
-    scale = min(gain[0], max(span[0], 0.0)), min(gain[1], span[1])
-    tied = bool(found.tied()[~mdp.terminal].all()) and not low > OPTIMAL_SHARE * scale[1]
-    return Loss(max(low, 0.0), max(high, 0.0), *scale, tied)
+    reward = as_reward(reward)
+    reward.expected(mdp)  # checks the shape
+    policy, known = completed(expert, mdp.n_states)
+    distribution = as_distribution(policy, mdp.n_states, mdp.n_actions)
+    rows = np.flatnonzero(mdp.reachable)
+    part, R = mdp.restrict(rows), reward.of_rows(rows)
+    unknown = ~known[rows] & ~part.terminal
+    c = compare(part, distribution[rows], np.flatnonzero(~unknown))
+    found = optimum(as_compared(part, c, R.on_states), R)
+    best = errs or bool(unknown.any())
+    margins = best_margins(found, c) if best else margins_of(found, c)
+    loss = loss_on(part, found, c.distribution, unknown)
+    paid = R.values if R.on_states else R.values[~part.terminal]
+    largest = float(np.abs(paid).max(initial=0.0))
+    return Optimality(
+        expert_optimal=loss.optimal,
+        loss_low=loss.low,
+        loss_bound=loss.high,
+        loss_share=loss.share,
+        at_stake=loss.scale_high,
+        errs=errs,
+        constant=not paid.size or bool(np.ptp(paid) <= ROUNDING * largest),
+        zero=largest == 0.0,
+        unknown=rows[unknown],
+        **_of_rows(mdp, rows, c, R, margins, unknown, c.equal & (not best), _left_out(mdp, rows, c, unbreakable)),
+    )
 
 
-def loss_on(table: TabularMDP, found: Optimum, expert: Matrix, unknown: StateMask | None = None) -> Loss:
-    """The same where the optimum is of a counted table as it was compared (`comparisons.as_compared`), and of the table itself.
+def _of_rows(
+    mdp: TabularMDP, rows: Indices, c: Comparisons, R: TabularReward, margins: Margins, unknown: np.ndarray, equal: np.ndarray,
+    left_out: np.ndarray,
+) -> dict[str, Any]:  # fmt: skip
+    """What the rows of (4) say, each by itself.
 
-    Whether actions that the counts do not tell from the expert's lead where its own do is not known: the bounds allow both.
+    Args:
+        mdp: the whole MDP.
+        rows: (r,) its states in the part.
+        c: the rows of (4) in the part.
+        R: the reward on the part.
+        margins: of each row.
+        unknown: (r,) states without rows, as nothing is known of the expert.
+        equal: (n,) rows that are violated to either side.
+        left_out: (n,) rows that no margin is taken over.
     """
-    one = loss_of(found, expert, unknown)
-    if found.table.mdp is table:
-        return one
-    other = loss_of(optimum(table, found.table.reward), expert, unknown)
-    scale = min(one.scale_low, other.scale_low), max(one.scale_high, other.scale_high)
-    return Loss(min(one.low, other.low), max(one.high, other.high), *scale, one.tied and other.tied)
+    usable = comparable(c, R)
+    kept = usable & ~left_out
+    margin = np.full(mdp.n_states, np.nan)
+    margin[rows] = least_per_state(margins.values[kept], c.states[kept], rows.size)
+    violations = margins.violations(equal)
+    which = np.flatnonzero(margins.violated(equal))
+    error, unsettled = None, np.zeros_like(kept)
+    if c.sampling is not None:
+        error, unsettled = c.sampling.unsettled(margins.values, margins.worth, kept, margins.none)
+    acting = np.flatnonzero(~unknown & ~mdp.terminal[rows])
+
+    def named(chosen: np.ndarray) -> Indices:
+        return rows[np.unique(c.states[chosen])].astype(np.int64)
+
+    return {
+        "worst_violation": float(violations.max(initial=0.0)),
+        "margin": margin,
+        "indifferent": bool((np.abs(margins.values) <= margins.none).all()),
+        "unconstrained": rows[np.setdiff1d(acting, c.states[usable])],
+        "inseparable": named(c.trivial & ~c.equal & R.on_states),
+        "marginless": named(kept & (margins.values <= margins.none)),
+        "violated": named(which),
+        "violated_rows": c.pairs(rows, which),
+        "violations": violations[which],
+        "sampling_error": error,
+        "unsettled": named(unsettled),
+    }
 
 
-def _span(found: Optimum, expert: Matrix) -> tuple[float, float]:
-    """Bounds of the span of V* over the states that the expert or an optimal policy visits, or of what stands for it."""
-    visited, taken = _visited(found, expert)
-    h, e = found.W.differences[visited], found.error[visited].astype(np.longdouble)
-    low, high, unsure = float((h - e).max() - (h + e).min()), float((h + e).max() - (h - e).min()), float(e.max())
-    largest = float(np.abs(h + np.longdouble(found.W.constant)).max())
-    size = float(found.advantages.size[taken].max(initial=0.0))
-    if high > max(FLAT * max(largest, size), found.table.reward.tolerance * found.table.horizon):
-        return low * (1 - OUTWARDS), high * (1 + OUTWARDS)
-    scale = largest if largest > max(FLAT * size, unsure) else size
-    return scale * (1 - OUTWARDS) - unsure, scale * (1 + OUTWARDS) + unsure
-
-
-def _visited(found: Optimum, expert: Matrix) -> tuple[StateMask, ActionSets]:
-    """(S,) the states that the expert or an optimal policy visits, and (S, A) what these do there.
-
-    The optimal policy does what the expert does, where that is tied.
-    """
-    mdp = found.table.mdp
-    like = (found.tied() | (expert == 0)).all(axis=1)
-    optimal = np.where(like[:, None], expert, np.eye(mdp.n_actions)[found.policy])
-    reached = [TransitionTable(mdp.P_pi(policy), mdp.d0).reachable for policy in (expert, optimal)]
-    taken = (expert > 0) & reached[0][:, None] | (optimal > 0) & reached[1][:, None]
-    return reached[0] | reached[1], taken
-
-
-def _sum(d0: np.ndarray, values: np.ndarray, side: int) -> float:
-    """d0 . values, rounded to one side."""
-    where = d0 > 0
-    return float(d0[where] @ values[where] + side * OUTWARDS * (d0[where] @ np.abs(values[where])))
+def _left_out(mdp: TabularMDP, rows: Indices, c: Comparisons, unbreakable: Any) -> np.ndarray:
+    """(n,) which rows of (4) are among those given as unbreakable."""
+    given = () if unbreakable is None else unbreakable
+    pairs = any_array("unbreakable", given, "(u, 2) states and actions", InvalidParameter)
+    if pairs.size == 0:
+        return np.zeros(c.states.size, dtype=bool)
+    shape = np.array([mdp.n_states, mdp.n_actions])
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu" or not ((pairs >= 0) & (pairs < shape)).all():
+        told = f"{mdp.n_states} states and {mdp.n_actions} actions"
+        raise InvalidParameter(f"unbreakable is {pairs.tolist()!r:.60}: expected (u, 2) whole numbers, of {told}.")
+    return np.isin(rows[c.states] * mdp.n_actions + c.actions, pairs @ np.array([mdp.n_actions, 1]))

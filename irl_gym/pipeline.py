@@ -83,14 +83,16 @@ def recover_and_retrain(
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-        metrics = _read_again(loop) if stages["report"].get("kept") else loop.folder_metrics
-    return Report(loop.folder.path, metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
+        found = loop.folder_metrics, loop.certificate
+        metrics, certificate = _read_again(loop) if stages["report"].get("kept") else found
+    return Report(loop.folder.path, metrics, certificate, stages, experiment.to_json(), _shown(loop.env))
 
 
-def _read_again(loop: Loop) -> Mapping[str, Any]:
-    """The metrics of a run that was finished before, which may have been changed since."""
+def _read_again(loop: Loop) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """The metrics and the certificate of a run that was finished before, which may have been changed since."""
     with understood(loop.folder.path):
-        return read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None).metrics
+        run = read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None)
+        return run.metrics, run.certificate
 
 
 def _shown(env: gym.Env) -> Mapping[str, int]:

@@ -68,6 +68,21 @@ def as_distribution(policy: Any, n_states: int, n_actions: int) -> Matrix:
     return _checked_probabilities(array)
 
 
+def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
+    """A policy with random actions where nothing is known of it, rows of NaN, and (S,) where something is.
+
+    Raises:
+        InvalidPolicy: rows of several lengths, or nothing is known in any state.
+    """
+    array = policy_array(expert)
+    if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
+        return expert, np.ones(n_states, dtype=bool)
+    unknown = np.asarray(np.isnan(array).all(axis=1))
+    if unknown.all():
+        raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
+    return np.where(unknown[:, None], 1 / array.shape[1], array), np.logical_not(unknown)
+
+
 def policy_array(policy: Any) -> np.ndarray:
     """A policy as an array: that of a TabularPolicy, or what was given.
 

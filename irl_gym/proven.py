@@ -1,13 +1,18 @@
-"""What every certificate says of its program's optimum, and how json holds it."""
+"""What every learner's proof says of its program's optimum, and how json holds such records."""
 
 import math
 from typing import Any
 
 import numpy as np
 
+from irl_gym.facts import Fact, aligned
+
+ROUNDING = 1e-7
+"""A gap below this share of the objective is none."""
+
 
 class Proven:
-    """What every certificate says of the program's optimum."""
+    """What every proof says of the program's optimum."""
 
     objective: float
     dual_bound: float
@@ -18,20 +23,37 @@ class Proven:
         return self.dual_bound - self.objective
 
     @property
-    def optimality(self) -> str:
-        """The same in a line that a person reads."""
-        return f"objective                {self.objective:.6g}, at most {max(self.duality_gap, 0.0):.1e} below the optimum"
+    def optimum(self) -> Fact:
+        """The same in a sentence."""
+        gap = self.duality_gap
+        short = f"at most {gap:.1e} below the best possible"
+        short = "to rounding the best possible" if gap <= ROUNDING * max(1.0, abs(self.objective)) else short
+        return Fact("objective of the program", f"{self.objective:.6g}, {short if gap == gap else 'without a bound'}")
+
+    def facts(self) -> tuple[Fact, ...]:
+        """What the proof says, in sentences."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        """The facts, line by line."""
+        return aligned(self.facts())
 
     def to_json(self) -> dict[str, Any]:
-        """The certificate as json holds it: NaN and infinity become None."""
-        return plain(self, "duality_gap", "degenerate")
+        """As json holds it: NaN and infinity become None."""
+        return plain(self, "duality_gap")
 
 
-def plain(certificate: Any, *properties: str) -> dict[str, Any]:
-    """The fields of a certificate, and some of its properties, as json holds them: NaN and infinity become None."""
+def cap_told(cap: float | None) -> Fact:
+    """The cap on margins; a program without one may leave ties."""
+    without = "none: Ng & Russell's own program, which may leave ties that a cap breaks (margin_cap='auto', --margin-cap auto)"
+    return Fact("margin cap", without if cap is None else f"{cap:.4g}")
+
+
+def plain(record: Any, *properties: str) -> dict[str, Any]:
+    """The fields of a record, and some of its properties, as json holds them: NaN and infinity become None."""
     found: dict[str, Any] = {}
-    for name in (*certificate.__dataclass_fields__, *properties):
-        value = getattr(certificate, name)
+    for name in (*record.__dataclass_fields__, *properties):
+        value = getattr(record, name)
         if isinstance(value, np.ndarray):
             found[name] = [None if v != v else v for v in value.tolist()]
         else:

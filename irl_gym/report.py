@@ -9,18 +9,19 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from irl_gym.certificates import facts_in
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.confirmation import loss_told
 from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
+from irl_gym.facts import Fact
 from irl_gym.intervals import as_interval
-from irl_gym.optimality import AT_STAKE
+from irl_gym.page.compared import DISTANCES
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
 from irl_gym.run_reader import understood
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged
-from irl_gym.told_rewards import told_of_reward
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
 """Findings that say that what was given is not what it seems: they are told at once."""
@@ -183,27 +184,45 @@ def _how_valued(report: Report) -> str:
 
 
 def _reward(report: Report) -> Table:
-    reward = report.metrics["reward"]
+    """What the reward says of the expert, what is measured of it, and what its learner proves."""
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
-    for what, told in told_of_reward(reward, report.metrics):
-        table.add_row(what, Text(told))
-    tie = "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
-    told = (tie if "worst_tie_regret" in reward else "", f"{AT_STAKE} " if reward.get("loss_share") is not None else "")
-    table.caption = "".join(told) + _CAPTIONS.get(reward["learner"], "")
+    of_reward, of_program = facts_in(report.certificate)
+    measured = (Fact(*one) for one in _measured(report.metrics["reward"]))
+    for one in (*of_reward, *measured, *of_program):
+        table.add_row(one.label, Text(one.sentence, COLOURS[one.mood]))
+    if "worst_tie_regret" in report.metrics["reward"]:
+        table.caption = "worst-tie regret: what the worst policy greedy under the reward loses against the expert."
     table.caption_justify = "left"
     return table
 
 
-_CAPTIONS = {
-    "FiniteLP": "lambda: price of ||R||_1; above lambda_0 R is 0. margin: how much better the expert's action is than another.",
-    "FeatureLP": "sample: the states that the program compares actions in. rank: directions of alpha they say anything about.",
-    "TrajectoryLP": (
-        "distance: ||V expert - V policy||_1 in the features, of the policy planned in the best round; no reward with "
-        "|alpha_i| <= 1 tells the two apart by more on these trajectories."
-    ),
-}
+def _measured(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is known of the reward where the true one is: what the worst tie loses, and how far it is from the true one."""
+    if "worst_tie_regret" in reward:
+        yield "worst-tie regret", _worst_tie(reward)
+    known = [f"{name} {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]
+    if known:
+        yield (
+            "distance from the true one",
+            f"{', '.join(known)}; 0 ranks all policies alike, 0.71 is unrelated; the best can agree in spite of it",
+        )
+
+
+def _worst_tie(reward: Mapping[str, Any]) -> str:
+    """What the worst tie loses, where there is a scale to say it on."""
+    share = reward["worst_tie_regret_share"]
+    if share is None:
+        return "not known, as there is no score"
+    regret, of_range = _zero(reward["worst_tie_regret"]), f", {abs(share):.2%} of what the expert has over random"
+    beware = "; how an agent breaks ties decides what it earns" if share > MUCH else ""
+    return f"{regret:.4g}{of_range}{beware}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
+
+
+def _zero(value: float) -> float:
+    """A loss, without the sign of rounding."""
+    return 0.0 if abs(value) < 1e-9 else value
 
 
 def _stages(report: Report) -> Table:

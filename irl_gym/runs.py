@@ -12,9 +12,11 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.archives import json_in, read_arrays
+from irl_gym.certificates import read_certificate
 from irl_gym.claims import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
 from irl_gym.curves import Curve, read_curve
 from irl_gym.errors import InvalidInput, RunIncomplete
+from irl_gym.evaluation import reward_told
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
@@ -54,7 +56,7 @@ class Run:
     agent: np.ndarray | None
     """(S,) actions of the retrained agent, or (S, A); None where there is no table."""
     certificate: Mapping[str, Any]
-    """The content of certificate.json."""
+    """The content of certificate.json; where `recomputed`, its optimality is not the record's but of these files."""
     metrics: Mapping[str, Any]
     """The content of metrics.json."""
     curve: Curve
@@ -75,7 +77,7 @@ class Run:
     vouched: bool
     """Is a digest recorded of each file that was read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
-    """Is what the metrics say of the expert's loss under the reward computed from these files, not the run's record?"""
+    """Is what certificate and metrics say of the expert under the reward computed from these files, not the run's record?"""
     judged_again: bool = False
     """And what they say of values, scores, agreement, the worst tie and distances between rewards?"""
 
@@ -168,7 +170,7 @@ def _read(path: Path, table: Tabulation | None) -> Run:
         learned=reader.read("reward.npz", load_reward),
         expert=reader.read("expert.npz", load_actions) if on_table else None,
         agent=reader.read("agent_policy.npz", load_actions) if on_table else None,
-        certificate=reader.read("certificate.json", read_json), metrics=metrics,
+        certificate=reader.read("certificate.json", read_certificate), metrics=metrics,
         curve=reader.read("learning_curve.csv", read_curve), stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
@@ -245,7 +247,7 @@ def _with_proof(run: Run, reader: RunReader) -> Run:
     if run.table is None or reward is None:
         return run
     try:
-        found = recomputed(run.path, run.config, run.metrics["reward"], run.table, run.expert, reward)
+        found = recomputed(run.path, run.config, run.certificate, run.table, run.expert, reward)
         now = again(run.config, run.metrics, run.table, run.expert, run.agent, reward, run.curve)
     except InvalidInput as error:
         mend = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
@@ -254,9 +256,9 @@ def _with_proof(run: Run, reader: RunReader) -> Run:
     if now is not None:
         _check_claims(now[0], run, reader)
         metrics = with_again(metrics, now[1])
-    metrics = {**metrics, "reward": {**metrics["reward"], **(found or {})}}
-    optimal = found is not None and "expert_optimal" in found
-    return replace(run, metrics=metrics, recomputed=optimal, judged_again=now is not None)
+    certificate = run.certificate if found is None else {**run.certificate, "optimality": found}
+    metrics = {**metrics, "reward": {**metrics["reward"], **reward_told(certificate)}}
+    return replace(run, certificate=certificate, metrics=metrics, recomputed=found is not None, judged_again=now is not None)
 
 
 def _check_claims(told: Iterable[Claim], run: Run, reader: RunReader) -> None:

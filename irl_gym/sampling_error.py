@@ -100,13 +100,6 @@ def estimated_table(table: Mapping[str, Any], reward: Mapping[str, Any]) -> str:
     )
 
 
-def told_by_counts(error: float | None, unsettled: int) -> list[str]:
-    """What a certificate on a counted table says of it; no line of an exact one."""
-    lines = [] if error is None else [f"judged on                {counted_table(error)}"]
-    where = "1 state" if unsettled == 1 else f"{unsettled} states"
-    return lines + ([f"unsettled                in {where} a margin is within its sampling error"] if unsettled else [])
-
-
 def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndarray, actions: np.ndarray) -> SamplingError:
     """Compare what an expert does in some states (n,) with an action (n,) each, by the counts of a counted table.
 

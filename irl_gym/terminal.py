@@ -12,6 +12,7 @@ from rich.text import Text
 from tyro.conf import DisallowNone, OmitArgPrefixes, arg
 
 from irl_gym.errors import InvalidParameter
+from irl_gym.facts import harmless
 
 UNSET = arg(help_behavior_hint="")
 """What stands for "not given" is not shown in --help; the text says what happens then."""
@@ -55,11 +56,6 @@ def print_table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]
     for row in rows:
         table.add_row(*row)
     Console(width=width, markup=False, emoji=False).print(table)
-
-
-def harmless(text: str) -> str:
-    """A text that may be out of a file, without what a terminal obeys: controls, and marks that turn its direction."""
-    return "".join(one if one.isprintable() or one == "\n" else ascii(one)[1:-1] for one in text)
 
 
 def print_error(error: Exception) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.comparisons import as_compared, compare
+from irl_gym.certificates import certified, optimality_told
 from irl_gym.curves import Curve
 from irl_gym.diagnoses.unfinished import seen_with_noise
 from irl_gym.dynamic_programming import optimum
@@ -30,18 +30,12 @@ from irl_gym.evaluation import (
     shown_told,
     table_told,
 )
-from irl_gym.learners.feature_rows import completed
-from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import agreement, policy_value
-from irl_gym.optimality import Loss, loss_on
-from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import SURPRISES
 from irl_gym.scores import Scale
 from irl_gym.tabulation import Tabulation
 
-JUDGED_BY_LOSS = ("FiniteLP", "FeatureLP")
-"""Learners whose certificate on a table says what the best policy earns more than the expert."""
 ROUNDING = 1e-9
 """Share of what is at stake by which two computations of one loss may differ: features are not alike on all machines."""
 WITHIN = 1e-6
@@ -87,28 +81,6 @@ class Claim:
         return found == value or (self.within > 0 and isinstance(found, int | float) and abs(found - value) <= self.within)
 
 
-def loss_under(mdp: TabularMDP, expert: Any, reward: TabularReward) -> Loss:
-    """What the best policy earns more than an expert under a reward, as certificates have it.
-
-    Args:
-        mdp: the whole table.
-        expert: (S,) actions or (S, A) probabilities; NaN where nothing is known of it, and it may do anything.
-        reward: of the table.
-
-    Raises:
-        InvalidPolicy: an expert of the wrong shape or content.
-        InvalidReward: a reward of the wrong shape.
-    """
-    reward.expected(mdp)  # checks the shape
-    policy, known = completed(expert, mdp.n_states)
-    rows = np.flatnonzero(mdp.reachable)
-    part, distribution = mdp.restrict(rows), as_distribution(policy, mdp.n_states, mdp.n_actions)[rows]
-    seen = known[rows] | part.terminal
-    R = reward.of_rows(rows)
-    found = optimum(as_compared(part, compare(part, distribution, np.flatnonzero(seen)), R.on_states), R)
-    return loss_on(part, found, distribution, ~seen)
-
-
 def claims(
     config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]], certificate: Mapping[str, Any],
     metrics: Mapping[str, Any], table: Tabulation | None,
@@ -137,16 +109,14 @@ def claims(
 
 
 def recomputed(
-    path: Path, config: Mapping[str, Any], record: Mapping[str, Any], table: Tabulation, expert: Any, reward: TabularReward
+    path: Path, config: Mapping[str, Any], certificate: Mapping[str, Any], table: Tabulation, expert: Any, reward: TabularReward
 ) -> dict[str, Any] | None:
-    """The record of a reward's loss as computed now; None where the demonstrations are gone.
-
-    Of a learner that judges by episodes its record stands, and beside it, as `on_table`, what the table says.
+    """What a run's reward says of its expert as computed now, as json holds it; None where the demonstrations are gone.
 
     Args:
         path: the run's folder, where the demonstrations of an expert with noise are.
         config: the run's.
-        record: `reward` of metrics.json.
+        certificate: the content of certificate.json.
         table: the run's.
         expert: (S,) actions or (S, A) probabilities; NaN where nothing is known of it.
         reward: the learned one, in the table.
@@ -155,6 +125,7 @@ def recomputed(
         InvalidReward: the bounds that are recorded cannot be of this table, expert and reward.
         InvalidDiscount: nor can the discount.
         InvalidPolicy: an expert of the wrong shape or content.
+        InvalidParameter: rows that are recorded as unbreakable are not this table's.
     """
     if config.get("gamma") != table.mdp.gamma:
         raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
@@ -162,18 +133,17 @@ def recomputed(
         known = seen_with_noise(path, table) if config.get("epsilon") else expert
     except (IrlGymError, OSError, *SURPRISES):
         return None
-    now, low, high = loss_under(table.mdp, known, reward), record.get("loss_low"), record.get("loss_bound")
-    if record.get("learner") not in JUDGED_BY_LOSS:
-        return {"on_table": str(now)}
-    rounding = ROUNDING * now.scale_high
+    episodes = config.get("dataset") is not None or bool(config.get("epsilon"))
+    now, recorded = certified(table, known, reward, certificate["proof"], episodes=episodes), certificate["optimality"] or {}
+    low, high = recorded.get("loss_low"), recorded.get("loss_bound")
+    rounding = ROUNDING * now.at_stake
     above, below = math.inf if high is None else high, -math.inf if low is None else low
-    if now.low > above + rounding or now.high < below - rounding:
+    if now.loss_low > above + rounding or now.loss_bound < below - rounding:
         raise InvalidReward(
-            f"under the reward the best policy earns {now.low:.3g} to {now.high:.3g} more than the expert: "
+            f"under the reward the best policy earns {now.loss_low:.3g} to {now.loss_bound:.3g} more than the expert: "
             f"expected {below:.3g} to {above:.3g}, as recorded"
         )
-    share = now.share if math.isfinite(now.share) else None
-    return {"expert_optimal": now.optimal, "loss_low": now.low, "loss_bound": now.high, "loss_share": share}
+    return optimality_told(now, table)
 
 
 def again(

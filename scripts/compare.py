@@ -14,12 +14,13 @@ from rich.text import Text
 
 from irl_gym import IrlGymError
 from irl_gym.errors import InvalidParameter
+from irl_gym.facts import harmless
 from irl_gym.page.comparison import lettered, write_comparison
 from irl_gym.page.pooled import told
 from irl_gym.pooling import pools
 from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
-from irl_gym.terminal import check_writable, harmless, print_error
+from irl_gym.terminal import check_writable, print_error
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,10 @@ from irl_gym import IrlGymError
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
 from irl_gym.errors import RunIncomplete
+from irl_gym.facts import harmless
 from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
-from irl_gym.terminal import harmless, print_error
+from irl_gym.terminal import print_error
 
 WHOSE = (
     "What only the learner knew, as lambda_0 and what its solver said, and what episodes showed is the run's own record; "

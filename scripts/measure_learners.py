@@ -18,6 +18,7 @@ from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.demonstrations import collect_from_table
 from irl_gym.features import FeatureMap, OneHot, Unravel
 from irl_gym.metrics import normalised_score, policy_value, random_value
+from irl_gym.optimality import certify
 from irl_gym.planners import tabular_actions
 from irl_gym.policies import Policy
 from irl_gym.terminal import print_table
@@ -68,7 +69,8 @@ def of_features() -> Iterator[tuple[str, ...]]:
                 learned = found.reward.tabular(known.table.states)
                 greedy = policy_iteration(known.table.mdp, learned).policy
                 worst = worst_tie(known.table.mdp, learned, known.table.reward).policy
-                cells += [f"{known.score(greedy):.3f} / {known.score(worst):.3f}", str(found.certificate.violated.size)]
+                violated = certify(known.table.mdp, known.expert, learned).violated
+                cells += [f"{known.score(greedy):.3f} / {known.score(worst):.3f}", str(violated.size)]
             yield name, f"{features}: {phi.n_features}", *cells
 
 
@@ -96,7 +98,7 @@ def large(size: int, centres: int, sample: int) -> tuple[str, ...]:
     begin = time.perf_counter()
     found = FeatureLP(phi, S_0=sample).fit(mdp, expert)
     seconds, peak = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    gap = f"{found.certificate.duality_gap / found.objective:.0e}"
+    gap = f"{found.proof.duality_gap / found.proof.objective:.0e}"
     return f"{size**2:,}", f"{centres**2}", f"{sample:,}", f"{seconds:.1f} s", f"{peak:.2f} GB", gap
 
 

@@ -72,7 +72,7 @@ def row(name: str, asked: Arguments) -> list[str]:
     expert, random = float(table.mdp.d0 @ best.V), random_value(table.mdp, table.reward)
     result = FiniteLP(reward_on="state-action" if "(s, a)" in name else "state").fit(table.mdp, best.policy)
     regret = (expert - worst_tie(table.mdp, result.reward, table.reward).value) / (expert - random)
-    cap, scaled = float(result.certificate.margin_cap or np.nan), float(np.abs(table.reward.values).max())
+    cap, scaled = float(result.proof.margin_cap or np.nan), float(np.abs(table.reward.values).max())
     shaped = ExpectedAdvantage(cap)
     rewards = {
         "learned, shaped": (shaped.apply(result.reward, table.mdp), FOR_ADVANTAGES),

@@ -50,7 +50,7 @@ def linear_program(size: int, gamma: float, **settings) -> str:
     expert = policy_iteration(mdp, R).policy
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
-    gap = FiniteLP(**settings).fit(mdp, expert).certificate.duality_gap
+    gap = FiniteLP(**settings).fit(mdp, expert).proof.duality_gap
     seconds = time.perf_counter() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return f"{seconds:.2f} s, peak {peak / MEGABYTE:.0f} MB ({(peak - before) / MEGABYTE:.0f} above before), gap {gap:.0e}"

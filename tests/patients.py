@@ -3,14 +3,16 @@
 import numpy as np
 from models import ring
 
-from irl_gym.certificate import certify
+from irl_gym.comparisons import compare
 from irl_gym.diagnosis import doctor
 from irl_gym.features import Table
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.feature_rows import completed
-from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
+from irl_gym.learners.finite_proof import prove
+from irl_gym.learners.trajectory_proof import TrajectoryProof
 from irl_gym.linear_reward import LinearReward
+from irl_gym.margins import comparable
 from irl_gym.mdp import TabularMDP
+from irl_gym.policies import completed
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import Status
 
@@ -18,8 +20,9 @@ from irl_gym.solvers import Status
 def judged(mdp, expert, R, stats=None):
     """A result with this reward."""
     reward = TabularReward(np.asarray(R, dtype=float))
-    certificate = certify(mdp, completed(expert, mdp.n_states)[0], reward)
-    return IRLResult(reward, Status.OPTIMAL, certificate.objective, certificate, stats or {})
+    compared = compare(mdp, completed(expert, mdp.n_states)[0])
+    proof = prove(mdp, compared, reward, comparable(compared, reward), r_max=1.0)
+    return IRLResult(reward, Status.OPTIMAL, proof, stats or {})
 
 
 def names(result, mdp, expert, **known):
@@ -62,6 +65,7 @@ def sampled(**changes):
         "gaps": np.array([3.0, 1.0]), "gap_errors": np.array([0.1, 0.1]), "regret": -0.05, "regret_error": 0.1,
         "distance": 0.2, "distance_error": 0.3, "objective": 4.0, "dual_bound": 4.0, "penalty": 2.0, "gap_cap": None, "l1": 0.0,
         "alpha_l1_norm": 2.0, "rank": 2, "n_features": 2, "horizon": 500, "truncation": 0.01, "zero": False,
+        "round": 2, "rounds": 2,
     }  # fmt: skip
-    proof = TrajectoryCertificate(**{**healthy, **changes})
-    return IRLResult(LinearReward(np.array([1.0, -0.5]), Table(np.eye(2))), Status.OPTIMAL, 4.0, proof, stats)
+    proof = TrajectoryProof(**{**healthy, **changes})
+    return IRLResult(LinearReward(np.array([1.0, -0.5]), Table(np.eye(2))), Status.OPTIMAL, proof, stats)

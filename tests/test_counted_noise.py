@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from certified import both
 from inventory import Inventory, exact
 from rich.console import Console
 
@@ -87,7 +88,9 @@ def test_where_no_row_is_left_the_error_says_that_the_table_is_counted():
 
 def test_the_certificate_says_what_it_is_judged_on():
     result, _ = learned("large", "state")
-    assert "a counted table, margins within" in str(result.certificate) and result.certificate.unsettled.size
+    table, expert = counts("large")
+    found = both(result, table.mdp, expert)
+    assert "a counted table, margins within" in found.told and found.unsettled.size
 
 
 def test_the_doctor_names_margins_within_their_sampling_error():
@@ -99,7 +102,8 @@ def test_no_margin_that_counts_is_noise():
     result, _ = learned("large", "state")
     found, expert = counts("large")
     mdp, _ = exact(*SIZES["large"])
-    settled = np.setdiff1d(np.flatnonzero(np.nan_to_num(result.certificate.margin) > 0), result.certificate.unsettled)
+    told = both(result, found.mdp, expert)
+    settled = np.setdiff1d(np.flatnonzero(np.nan_to_num(told.margin) > 0), told.unsettled)
     V = policy_iteration(found.mdp, result.reward).V + result.reward.values
     true = compare(mdp, expert, settled).rows @ V if settled.size else np.zeros(0)
     assert (true > -1e-9).all()

@@ -54,7 +54,7 @@ def test_a_fit_in_a_child_has_the_same_bytes(learner, monkeypatch):
 def _told(result):
     """A reward's bytes and the certificate's numbers, to the last bit."""
     values = result.reward.alpha if hasattr(result.reward, "alpha") else result.reward.values
-    return values.tobytes(), json.dumps(result.certificate.to_json())
+    return values.tobytes(), json.dumps(result.proof.to_json())
 
 
 def test_what_a_child_keeps_is_called_there():

@@ -1,163 +1,222 @@
-"""Is an expert optimal: against rational arithmetic, and by the values of the issue that asked for it."""
+"""What a reward says of an expert, whoever made it: against dense arithmetic, and in sentences that are true."""
 
-from collections import Counter
-from fractions import Fraction
+import json
 
+import models
 import numpy as np
 import pytest
-from exact import ExactMDP
-from hard_cases import hard_case, some_expert
+import reference
+from hypothesis import given
 
-from irl_gym.certificate import certify
-from irl_gym.dynamic_programming import optimum
+from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
+from irl_gym.learners.feature import FeatureLP
 from irl_gym.mdp import TabularMDP
-from irl_gym.optimality import OPTIMAL_SHARE, Loss, loss_of, told_record
+from irl_gym.optimality import certify
+from irl_gym.rewards import TabularReward
 
 
-def visited(exact, does):
-    """States that are reached, given which actions (S, A) a policy takes."""
-    seen = {s for s in range(exact.S) if exact.d0[s] > 0}
-    todo = list(seen)
-    while todo:
-        s = todo.pop()
-        new = {t for a in range(exact.A) if does[s][a] for t in range(exact.S) if exact.P[s][a][t] > 0} - seen
-        seen |= new
-        todo += new
-    return seen
+def of_true_reward(model, **kwargs):
+    return certify(model.mdp, model.expert, TabularReward(model.R), **kwargs)
 
 
-def truth(exact, V, Q, expert, policy):
-    """The loss and the scale, in fractions."""
-    loss, gain = (
-        sum(d * (best - value) for d, best, value in zip(exact.d0, V, exact.evaluate(one), strict=True))
-        for one in (expert, np.full(expert.shape, 1 / exact.A))
-    )
-    like = [all(Q[s][a] == max(Q[s]) for a in range(exact.A) if expert[s, a] > 0) for s in range(exact.S)]
-    best = [expert[s] > 0 if like[s] else np.arange(exact.A) == policy[s] for s in range(exact.S)]
-    where = visited(exact, expert > 0) | visited(exact, best)
-    span, largest = max(V[s] for s in where) - min(V[s] for s in where), max(abs(V[s]) for s in where)
-    if span > Fraction(1e-12) * largest:
-        return loss, min(gain, span)
-    return loss, min(gain, largest) if largest else loss  # flat: nothing to compare a loss with but 0
+@given(model=models.models())
+def test_certify_says_optimal_for_the_reward_the_expert_maximises(model):
+    assert of_true_reward(model).expert_optimal
 
 
-def verdicts(seeds):
-    """How often each verdict met each truth; the bounds of the loss are checked on the way."""
-    found = Counter()
-    for seed in seeds:
-        mdp, reward, rng = hard_case(seed)
-        best, exact = optimum(mdp, reward), ExactMDP(mdp, reward.values)
-        V, Q = exact.optimum(best.policy)
-        expert = some_expert(exact, Q, rng)
-        told = loss_of(best, expert)
-        loss, scale = truth(exact, V, Q, expert, best.policy)
-        assert Fraction(told.low) <= loss <= Fraction(told.high), seed
-        found[told.optimal, loss == 0 or loss <= Fraction(OPTIMAL_SHARE) * scale] += 1
-    return found
+@given(model=models.models())
+def test_certify_says_not_optimal_for_the_negated_reward(model):
+    margins = reference.margins(model.P, model.mdp.gamma, model.expert, model.R)
+    found = certify(model.mdp, model.expert, TabularReward(-model.R))
+    assert found.expert_optimal == bool((margins < 1e-7).all())
 
 
-@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(60, 2060), marks=pytest.mark.slow)], ids=["few", "many"])
-def test_no_verdict_is_false_and_hardly_one_undecided(seeds):
-    found = verdicts(seeds)
-    assert not found[True, False] and not found[False, True] and found[True, True] and found[False, False], found
-    assert found[None, True] + found[None, False] <= 0.01 * len(seeds), found
+@given(model=models.models(kinds=("dense", "sparse")))
+def test_certify_margins_equal_the_dense_ones(model):
+    expected = reference.margins(model.P, model.mdp.gamma, model.expert, model.R)
+    np.testing.assert_allclose(of_true_reward(model).margin, expected, atol=1e-9)
 
 
-def corridor(gamma, cost, length=500):
-    """States in a row, the last terminal and paying 1; action 0 goes on for `cost`, action 1 for nothing."""
-    P = np.zeros((length + 1, 2, length + 1))
-    P[np.arange(length), :, np.arange(length) + 1] = 1
-    R = np.zeros((length + 1, 2))
-    R[:length, 0] = -cost
-    R[length - 1] += 1
-    return TabularMDP.from_dense(P, gamma, np.eye(length + 1)[0]), R
+@given(model=models.models(kinds=("dense", "sparse")))
+def test_certify_names_the_largest_violation(model):
+    S, A = model.mdp.n_states, model.mdp.n_actions
+    other = (model.expert + 1) % A
+    V = np.linalg.solve(np.eye(S) - model.mdp.gamma * model.P[np.arange(S), other], model.R)
+    following = model.P @ V
+    expected = (following - following[np.arange(S), other][:, None]).max()
+    found = certify(model.mdp, other, TabularReward(model.R)).worst_violation
+    assert found == pytest.approx(max(expected, 0), abs=1e-9)
 
 
-def test_an_expert_who_pays_at_each_step_is_not_optimal_at_a_discount_near_one():
-    mdp, R = corridor(0.999999, 0.0009)
-    found = certify(mdp, np.zeros(501, dtype=np.int64), R)
-    assert found.expert_optimal is False and found.loss_bound == pytest.approx(0.45, rel=1e-3)
-    assert found.violated.size == 500 and found.worst_violation == pytest.approx(0.0009)
+@pytest.mark.parametrize("shape", [(7,), (7, 3)])
+@pytest.mark.parametrize(("value", "zero"), [(0.0, True), (0.5, False)])
+def test_certify_calls_a_constant_reward_degenerate(shape, value, zero):
+    model = models.random_model(0)
+    found = certify(model.mdp, model.expert, TabularReward(np.full(shape, value)))
+    assert (found.constant, found.zero, found.degenerate) == (True, zero, True)
 
 
-def test_an_outlier_that_bad_actions_reach_does_not_dilute_the_loss():
-    P = np.zeros((4, 3, 4))
-    P[0, [0, 1, 2], [1, 2, 3]] = 1
-    mdp = TabularMDP.from_dense(P, 0.9, np.eye(4)[0])
-    found = certify(mdp, np.zeros(4, dtype=np.int64), np.array([0.0, 0.0, 1.0, -1e8]))
-    assert found.expert_optimal is False and found.loss_low == pytest.approx(1.0) and found.loss_share == pytest.approx(1.0)
-    assert certify(mdp, np.ones(4, dtype=np.int64), np.array([0.0, 0.0, 1.0, -1e8])).expert_optimal is True
-
-
-def test_a_reward_that_says_nothing_ties_everything():
-    P = np.full((2, 2, 2), 0.5)
-    told = certify(TabularMDP.from_dense(P, 0.9, [1.0, 0.0]), np.zeros(2, dtype=np.int64), np.ones(2))
-    assert told.expert_optimal and told.degenerate and np.isnan(told.loss_share) and "all actions are tied" in str(told)
-
-
-def test_a_reward_that_only_punishes_is_not_called_a_tie():
-    P = np.zeros((3, 3, 3))
-    P[0, [0, 1, 2], [1, 0, 2]] = P[1, [0, 1, 2], [0, 1, 2]] = P[2, :, 2] = 1
-    found = certify(TabularMDP.from_dense(P, 0.9, np.eye(3)[0]), np.zeros(3, dtype=np.int64), np.array([0.0, 0.0, -1.0]))
-    assert found.expert_optimal is True and found.loss_share == 0 and "tied" not in str(found).splitlines()[0]
-
-
-@pytest.mark.parametrize("c", [0.1, 0.3, 1 / 7, 1e6])
-@pytest.mark.parametrize("gamma", [0.9, 0.99, 1 - 2**-20])
-def test_payments_that_cancel_are_no_reason_for_doubt(c, gamma):
+def test_certify_does_not_call_a_price_of_steps_degenerate_where_episodes_end():
     P = np.zeros((3, 2, 3))
-    P[0, [0, 1], [1, 2]] = P[1, :, 0] = P[2, :, 2] = 1
-    R = np.array([[c, 0.0], [-c / gamma, -c / gamma], [-c, -c]])  # a step of c, and one that takes it back
-    expert = np.zeros(3, dtype=np.int64)
-    found = certify(TabularMDP.from_dense(P, gamma, np.eye(3)[0]), expert, R)
-    assert found.expert_optimal is True
-    assert certify(TabularMDP.from_dense(P, gamma, np.eye(3)[0]), np.ones(3, dtype=np.int64), R).expert_optimal is False
+    P[0, 0, 1] = P[0, 1, 0] = P[1, 0, 2] = P[1, 1, 0] = 1  # 2 is terminal: action 0 is the shortest way
+    mdp = TabularMDP.from_dense(P, 0.9, np.eye(3)[0])
+    found = certify(mdp, np.zeros(3, dtype=int), TabularReward(-np.ones(3)))
+    assert found.constant and found.expert_optimal and found.margin[:2].min() > 0.1
+    assert not found.degenerate and "degenerate" not in str(found)
+    features = FeatureLP(np.ones((3, 1))).fit(mdp, np.zeros(3, dtype=int))
+    assert (
+        features.reward.alpha.tolist() == [-1]
+        and not certify(mdp, np.zeros(3, dtype=int), features.reward.tabular(3)).degenerate
+    )
 
 
-def test_actions_that_counts_do_not_tell_apart_leave_a_loss_undecided():
+def test_certify_calls_a_reward_degenerate_that_ties_all_actions_though_it_is_not_constant():
     P = np.zeros((4, 2, 4))
-    P[0, 0, [1, 2]], P[0, 1, [1, 2]] = [0.5, 0.5], [0.56, 0.44]
-    P[1, :, 1] = P[2, :, 2] = P[3, :, 3] = 1
-    counted = TabularMDP(P.reshape(8, 4), 0.9, np.eye(4)[0], visits=np.full((4, 2), 200))
-    exact, R = TabularMDP(counted.P, 0.9, counted.d0), np.array([0.0, 1.0, 0.0, 0.0])
-    assert certify(exact, np.zeros(4, dtype=np.int64), R).expert_optimal is False
-    found = certify(counted, np.zeros(4, dtype=np.int64), R)
-    assert found.expert_optimal is None and found.loss_low == 0 and found.loss_bound == pytest.approx(0.6, rel=1e-3)
-
-
-def test_an_expert_known_in_part_is_judged_over_all_that_it_may_do():
-    mdp, R = corridor(0.9, 0.5, length=3)
-    found, expert = optimum(mdp, R), np.eye(2)[[1, 1, 1, 1]]
-    for unknown, optimal, most in (([], True, 0.0), ([0], None, 0.5), ([0, 1], None, 0.95), ([3], True, 0.0)):
-        free = np.isin(np.arange(4), unknown)
-        loss = loss_of(found, expert, free)
-        assert loss.optimal is optimal and loss.high == pytest.approx(most, rel=2e-3, abs=1e-12) and loss.low == 0
-    errs = loss_of(found, np.eye(2)[[1, 0, 1, 1]], np.array([True, False, False, False]))
-    assert errs.optimal is False and 0.44 < errs.low <= 0.45 and 0.95 <= errs.high < 0.96
-
-
-def test_unknown_states_that_the_expert_cannot_reach_do_not_matter():
-    P = np.zeros((4, 2, 4))
-    P[0, [0, 1], [1, 2]] = 1
-    P[2, :, 3] = 1
+    P[:, 0, :] = np.eye(4)[[1, 3, 3, 0]]
+    P[:, 1, :] = np.eye(4)[[2, 3, 3, 0]]  # 1 and 2 are alike
     mdp = TabularMDP.from_dense(P, 0.9, np.eye(4)[0])
-    found = optimum(mdp, np.array([[1.0, 0.0], [0, 0], [0.0, 0.5], [0, 0]]))
-    assert loss_of(found, np.eye(2)[[0, 0, 0, 0]], np.array([False, False, True, False])).optimal is True
+    found = certify(mdp, np.array([[1.0, 0.0], [0.5, 0.5], [0.5, 0.5], [0.5, 0.5]]), TabularReward(np.array([0.0, 1, 1, 3])))
+    assert not found.constant and found.degenerate and "ties the expert with every action" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("bounds", "optimal", "told"),
-    [
-        ((0.0, 1e-9, 1.0, 1.1), True, "yes: the best policy earns at most 1.0e-09 more, 1.0e-09 of what is at stake"),
-        ((0.5, 0.6, 1.0, 1.1), False, "no: the best policy earns at least 0.5 more"),
-        ((0.0, 0.6, 1.0, 1.1), None, "undecided: the best policy earns 0 to 0.6 more"),
-        ((0.0, np.inf, 1.0, 1.1), None, "undecided: the best policy earns at least 0 more, how much is not known"),
-    ],
-)
-def test_a_loss_is_told_in_a_sentence(bounds, optimal, told):
-    loss = Loss(*bounds, tied=False)
-    assert loss.optimal is optimal and str(loss) == told
+def test_certify_does_not_call_a_tie_with_one_action_of_two_degenerate():
+    P = np.zeros((3, 3, 3))
+    P[:, 0, 1] = P[:, 1, 1] = P[:, 2, 2] = 1
+    mdp = TabularMDP.from_dense(P, 0.9, np.eye(3)[0])
+    assert not certify(mdp, np.zeros(3, dtype=int), TabularReward(np.array([0.0, 1.0, 0.0]))).degenerate
 
 
-def test_a_record_of_a_run_from_before_losses_has_none():
-    assert told_record({"expert_optimal": True, "worst_violation": 0.0}) is None
+def test_certify_does_not_call_the_true_reward_degenerate():
+    assert not of_true_reward(models.random_model(0)).degenerate
+
+
+def corridor():
+    """States 0-3 in a row; in 1 both actions go right; 2 has two ways to 3; 3 is terminal; 4 is not reachable."""
+    P = np.zeros((5, 2, 5))
+    P[0, 0, 1] = P[0, 1, 0] = 1
+    P[1, :, 2] = 1
+    P[2, 0, 3] = P[2, 1, 0] = 1
+    P[4, :, 0] = 1
+    return TabularMDP.from_dense(P, 0.9, np.eye(5)[0])
+
+
+def test_certify_lists_states_outside_any_constraint():
+    found = certify(corridor(), np.zeros(5, dtype=int), TabularReward(np.eye(5)[3]))
+    assert found.unconstrained.tolist() == [1]
+
+
+def test_certify_lists_states_that_no_state_reward_separates():
+    found = certify(corridor(), np.zeros(5, dtype=int), TabularReward(np.eye(5)[3]))
+    assert found.inseparable.tolist() == [1]
+
+
+def test_certify_lists_states_without_a_margin():
+    found = certify(corridor(), np.zeros(5, dtype=int), TabularReward(np.full(5, 0.1) - np.eye(5)[3]))
+    assert 2 in found.marginless.tolist()
+
+
+def test_certify_has_no_margin_in_states_it_does_not_judge():
+    found = certify(corridor(), np.zeros(5, dtype=int), TabularReward(np.eye(5)[3]))
+    assert np.isnan(found.margin).tolist() == [False, True, False, True, True]
+
+
+def test_certify_demands_equality_among_the_actions_of_a_set():
+    model = models.random_model(0)
+    both = np.eye(3, dtype=bool)[model.expert] | np.eye(3, dtype=bool)[(model.expert + 1) % 3]
+    found = certify(model.mdp, both, TabularReward(model.R))
+    assert not found.expert_optimal
+
+
+def test_certify_measures_inequality_among_the_actions_of_an_expert_both_ways():
+    model = models.random_model(0, A=2)
+    expert = np.tile([0.9, 0.1], (7, 1))
+    found = [certify(model.mdp, expert, TabularReward(sign * model.R)).worst_violation for sign in (1, -1)]
+    assert found[0] == pytest.approx(found[1]) and found[0] > 0
+
+
+def test_certify_is_json_without_nan():
+    text = json.dumps(of_true_reward(models.random_model(0, kind="walls")).to_json(), allow_nan=False)
+    assert json.loads(text)["margin"][-1] is None
+
+
+def test_str_tells_by_how_much_the_expert_is_not_optimal():
+    model = models.random_model(0)
+    found = certify(model.mdp, model.expert, TabularReward(-model.R))
+    assert f"by at most {found.worst_violation:.3g}" in str(found)
+
+
+def test_str_counts_inseparable_states():
+    found = certify(corridor(), np.zeros(5, dtype=int), TabularReward(np.eye(5)[3]))
+    assert "in 1 state an action leads where the expert's own does: no reward on states tells them apart" in str(found)
+
+
+@pytest.mark.parametrize("shape", [(6,), (7, 2)])
+def test_certify_refuses_a_reward_of_another_shape(shape):
+    model = models.random_model(0)
+    with pytest.raises(InvalidReward, match=rf"shape \({shape[0]},"):
+        certify(model.mdp, model.expert, TabularReward(np.zeros(shape)))
+
+
+def test_certify_refuses_a_policy_of_another_shape():
+    with pytest.raises(InvalidPolicy, match=r"shape \(5,\)"):
+        certify(models.random_model(0).mdp, np.zeros(5, dtype=int), TabularReward(np.zeros(7)))
+
+
+# --- facts ---
+
+
+def crossing():
+    """From 0 and 1 action 0 leads to 2 and action 1 to 3; from 4 both lead there, and action 2 to 5; 2, 3, 5 are ends."""
+    P = np.zeros((6, 3, 6))
+    P[0, [0, 1, 2], [2, 3, 2]] = P[1, [0, 1, 2], [2, 3, 3]] = P[4, [0, 1, 2], [2, 3, 5]] = 1
+    return TabularMDP.from_dense(P, 0.9, np.array([0.4, 0.3, 0, 0, 0.3, 0]))
+
+
+def told(found):
+    """Sentences by label."""
+    return {one.label: one.sentence for one in found.facts()}
+
+
+def test_a_state_with_a_better_action_is_never_called_tied():
+    R = np.array([0, 0, 0.5, 1.0, 0, 0.5])  # in 0 and 1 action 1 is better, in 4 too; 2 and 5 are as good
+    found = certify(crossing(), np.array([0, 0, 0, 0, 1, 0]), R)
+    assert found.marginless.tolist() == [0, 1] and found.violated.tolist() == [0, 1] and found.tied.tolist() == []
+    assert told(found)["violated"] == "in 2 states another action is better under it: 3 actions, by at most 0.5"
+    assert "tied" not in told(found) and "tied" not in str(found)
+
+
+def test_a_state_without_a_better_action_is_called_tied():
+    found = certify(crossing(), np.array([0, 1, 0, 0, 0, 0]), np.array([0, 0, 0.5, 0.2, 0, 0.5]))
+    assert found.violated.tolist() == [1] and found.tied.tolist() == [4]
+    assert told(found)["tied"] == "in 1 state another action is as good as the expert's, and none better"
+
+
+def test_a_zero_reward_is_degenerate_and_no_list_of_ties():
+    found = certify(crossing(), np.array([0, 1, 0, 0, 0, 0]), np.zeros(6))
+    assert told(found)["degenerate"] == "R is zero" and "tied" not in told(found)
+
+
+@pytest.mark.parametrize(("sign", "mood"), [(1, "good"), (-1, "bad"), (0, "plain")])
+def test_whether_the_expert_is_optimal_has_its_mood(sign, mood):
+    model = models.random_model(0)
+    assert certify(model.mdp, model.expert, sign * model.R).facts()[0].mood == mood
+
+
+def test_an_expert_that_errs_is_judged_by_the_best_continuation():
+    mdp, R = crossing(), np.array([0, 0, 0.5, 1.0, 0, 0.5])
+    both = np.array([[0.5, 0.5, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
+    strict, mild = (certify(mdp, both, R, errs=errs) for errs in (False, True))
+    assert strict.violated_rows.tolist() == [[0, 0], [0, 1], [1, 1], [1, 2]]  # actions that it takes have to be as good
+    assert mild.violated_rows.tolist() == [[0, 1], [1, 1], [1, 2]] and "where one acts best afterwards" in str(mild)
+
+
+def test_margins_leave_out_rows_that_are_given_as_unbreakable():
+    R = np.array([0, 0, 1.0, 0.2, 0, 0.5])
+    whole, part = (certify(crossing(), np.zeros(6, dtype=int), R, unbreakable=rows) for rows in (None, [[4, 2]]))
+    assert (whole.margin[4], part.margin[4]) == pytest.approx((0.5, 0.8)) and part.margin[1] == whole.margin[1]
+
+
+@pytest.mark.parametrize("rows", [[[6, 0]], [[0, 3]], [[-1, 0]], [[0.5, 0]], [0, 1], [[0], [1, 2]], "all"])
+def test_rows_that_the_table_does_not_have_are_refused(rows):
+    with pytest.raises(InvalidParameter, match=r"unbreakable is .*: expected \(u, 2\)"):
+        certify(crossing(), np.zeros(6, dtype=int), np.zeros(6), unbreakable=rows)

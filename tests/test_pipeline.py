@@ -111,7 +111,7 @@ def test_the_agent_saved_is_the_agent_judged(report):
 
 def test_the_certificate_is_that_of_the_reward(report):
     reward = TabularReward.load(report.out / "reward.npz")
-    assert report.certificate["expert_optimal"] and reward.values.shape == (16,)
+    assert report.certificate["optimality"]["expert_optimal"] and reward.values.shape == (16,)
 
 
 def test_the_same_seed_gives_the_same_bytes(report, continued):

@@ -148,7 +148,7 @@ def test_the_same_is_learned_from_a_noisy_expert_and_from_its_dataset(from_noise
 
 
 def test_the_metrics_count_unknown_and_violated_states(from_noise):
-    reward, certificate = from_noise.metrics["reward"], from_noise.certificate
+    reward, certificate = from_noise.metrics["reward"], from_noise.certificate["optimality"]
     for key in ("unknown", "violated", "marginless"):
         assert reward[f"{key}_states"] == len(certificate[key])
     assert reward["slack"] == 1.0 and reward["expert_optimal"] == certificate["expert_optimal"]

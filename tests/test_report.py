@@ -9,6 +9,7 @@ from rich.console import Console
 
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.evaluation import settled_at
+from irl_gym.facts import Fact
 from irl_gym.pipeline import Report
 from irl_gym.report import print_report
 
@@ -17,17 +18,12 @@ CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991],
 
 def said(
     out, *, score=1.0, reason=None, share=0.0, config=None, training=None, demonstrations=None, policies=None, coloured=False,
-    **reward,
+    facts=((), ()), **reward,
 ):  # fmt: skip
-    """What is printed of a run of FiniteLP with these numbers, on one line."""
+    """What is printed of a run with these numbers, and these facts of its reward and of its program, on one line."""
     row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
-    told = {
-        "learner": "FiniteLP", "status": "Optimal within the solver's tolerances.", "expert_optimal": True, "degenerate": False,
-        "worst_tie_regret": 0.0, "worst_tie_regret_share": share, "lambda_0": 2.0, "l1": 0.0, "margin_cap": 1.0,
-        "duality_gap": 0.0, "least_l1_norm": 3.0, "l1_norm": 3.0, "marginless_states": 0, "violated_states": 0,
-        "inseparable_states": 0, "zero": False, "reward_on": "state",
-    } | reward  # fmt: skip
-    told = {key: one for key, one in told.items() if key != "violated_states" or one is not None}
+    told = {"learner": "Any", "worst_tie_regret": 0.0, "worst_tie_regret_share": share} | reward
+    kept = ({"facts": [one.to_json() for one in part]} for part in facts)
     metrics = {
         "policies": {name: row | (policies or {}).get(name, {}) for name in ("expert", "random", "retrained")},
         "score_reason": reason, "reward": told,
@@ -39,7 +35,9 @@ def said(
     asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
     stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
     console = Console(file=io.StringIO(), width=250, force_terminal=coloured, color_system="standard" if coloured else None)
-    print_report(Report(out, metrics, {}, stages, asked | (config or {}), {}), console)
+    print_report(
+        Report(out, metrics, dict(zip(("optimality", "proof"), kept, strict=True)), stages, asked | (config or {}), {}), console
+    )
     return " ".join(console.file.getvalue().split())
 
 
@@ -71,28 +69,15 @@ def test_agreement_is_told_as_it_is_counted(tmp_path, only, told):
     assert f"agreement: share of states with {told}" in said(tmp_path, demonstrations=demonstrations)
 
 
-def test_no_advice_on_ties_is_given_when_the_reward_is_zero(tmp_path):
-    assert "Try" not in said(tmp_path, zero=True, marginless_states=11, inseparable_states=2, share=0.9)
+def test_facts_of_the_reward_stand_before_those_of_its_program_whoever_learned_it(tmp_path):
+    facts = (Fact("tied", "in 1 state"),), (Fact("dice", "thrown once"),)
+    assert "tied │ in 1 state" in (text := said(tmp_path, facts=facts)) and text.index("tied") < text.index(
+        "dice │ thrown once"
+    )
 
 
-@pytest.mark.parametrize(
-    ("share", "words"), [(0.2, "successors. Try --reward-on state-action."), (0.0, "successors. Nothing is lost by it.")]
-)
-def test_states_it_cannot_settle_are_mended_only_when_something_is_lost(tmp_path, share, words):
-    assert words in said(tmp_path, inseparable_states=1, share=share)
-
-
-@pytest.mark.parametrize(("gap", "words"), [(0.0, "none"), (1e-15, "none"), (1e-8, "at most 1.0e-08")])
-def test_a_gap_of_nothing_is_none(tmp_path, gap, words):
-    assert f"margins short of the most by │ {words}" in said(tmp_path, duality_gap=gap)
-
-
-@pytest.mark.parametrize("error, words", [(0.25, "gains 0.5 +- 0.25"), (None, "gains 0.5, and one episode tells no noise")])
-def test_an_expert_that_is_beaten_is_told_with_the_noise(tmp_path, error, words):
-    proof = {"regret": 0.5, "regret_error": error, "distance": 1.0, "distance_error": error, "fell_short": False}
-    rounds = {"n_features": 16, "best_round": 1, "rounds": 2, "horizon": 9, "truncation": 0.1}
-    text = said(tmp_path, learner="TrajectoryLP", expert_optimal=False, violated_states=None, **proof, **rounds)
-    assert words in text
+def test_a_fact_has_the_colour_of_its_mood(tmp_path):
+    assert "\x1b[31min 1 state" in said(tmp_path, facts=((Fact("violated", "in 1 state", "bad"),), ()), coloured=True)
 
 
 def test_a_healthy_run_does_not_mention_the_doctor(tmp_path):
@@ -171,8 +156,8 @@ def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
 def test_names_are_printed_as_they_are_and_never_read_as_markup(tmp_path, name):
     policies = {"expert": {"score": None}, "random": {"score": None}, "retrained": {"score": None}}
     text = said(
-        tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies, status=f"it is {name}",
-        config={"env_kwargs": {"map": name}, "dataset": name},
+        tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies,
+        facts=((), (Fact("status", f"it is {name}"),)), config={"env_kwargs": {"map": name}, "dataset": name},
     )  # fmt: skip
     assert f"/{name}: dataset, reward" in text and f"/{name}/report.html in a browser" in text
     assert f"(map={name})" in text and f"There is no score: of {name}." in text and f"status │ it is {name}" in text

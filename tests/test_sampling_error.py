@@ -9,8 +9,8 @@ from scipy.stats import poisson
 
 from irl_gym.comparisons import compare
 from irl_gym.errors import InvalidMDP
-from irl_gym.learners.feature_certificate import judge_table
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import certify
 from irl_gym.rewards import TabularReward
 
 SHAPES = {
@@ -147,5 +147,4 @@ def test_visits_that_are_no_counts_are_refused(visits):
 
 def test_feature_rewards_have_no_margin_within_noise():
     mdp, policy, R = table(two([520, 480], [480, 520])), np.zeros(60, dtype=int), np.linspace(-1, 1, 60)
-    found = judge_table(mdp, policy, np.ones(60, dtype=bool), TabularReward(R), np.zeros((0, 2), dtype=np.int64))
-    assert np.isnan(found.margin[0])
+    assert np.isnan(certify(mdp, policy, TabularReward(R)).margin[0])

@@ -6,7 +6,8 @@ import pytest
 from rich.console import Console
 
 from irl_gym.errors import RunIncomplete
-from irl_gym.terminal import harmless, print_error, stage_bars
+from irl_gym.facts import harmless
+from irl_gym.terminal import print_error, stage_bars
 
 
 def shown(*, terminal):

@@ -9,15 +9,15 @@ import pytest
 from forgetting import with_digests_anew
 from lake_run import asked
 
+from irl_gym.certificates import claims_in, facts_in
 from irl_gym.errors import RunIncomplete
 from irl_gym.linear_reward import load_reward
-from irl_gym.page.proof import certificate, verdict
 from irl_gym.pipeline import recover_and_retrain
+from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run
 from irl_gym.verified import again, claims, recomputed, with_again
-from irl_gym.worlds import load_actions
 
 
 @pytest.fixture(scope="module")
@@ -61,17 +61,41 @@ def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(unvouched, fi
 
 def test_what_is_said_of_the_expert_is_computed_and_not_read(unvouched, run):
     for name in ("metrics.json", "certificate.json"):
-        edited(unvouched / name, **({"reward.expert_optimal": False} if name == "metrics.json" else {"expert_optimal": False}))
+        edited(
+            unvouched / name,
+            **({"reward.expert_optimal": False} if name == "metrics.json" else {"optimality.expert_optimal": False}),
+        )
     assert read_run(unvouched).metrics["reward"] == run.metrics["reward"] and run.recomputed
 
 
-def test_a_learner_that_judges_by_episodes_has_the_word_of_the_table_beside_its_own(finished, run):
-    record = {**run.metrics["reward"], "learner": "TrajectoryLP", "expert_optimal": True}
-    found = recomputed(finished, run.config, record, run.table, run.expert, TabularReward(-run.tabular.values))
-    told = replace(run, metrics={**run.metrics, "reward": record | found}, recomputed=False)
-    assert found["on_table"].startswith("no: the best policy earns at least")
-    assert f"by the run's own record, and on the table: {found['on_table']}" in verdict(told)["sentence"]
-    assert ("Judged on the table", found["on_table"]) in certificate(told).shown["lines"]
+def test_on_a_table_its_word_counts_more_than_that_of_episodes(finished, run):
+    proof, negative = {"expert_optimal": True, "facts": []}, TabularReward(-run.tabular.values)
+    found = recomputed(finished, run.config, {"optimality": None, "proof": proof}, run.table, run.expert, negative)
+    assert found["facts"][0]["sentence"].startswith("no: the best policy earns at least")
+    assert claims_in({"optimality": found, "proof": proof})["expert_optimal"] is False
+
+
+def test_facts_of_the_reward_are_computed_and_not_read(copied, run):
+    edited(copied / "certificate.json", **{"optimality.facts": [{"label": "tied", "sentence": "a lie", "mood": "good"}]})
+    found = read_run(with_digests_anew(copied))
+    assert facts_in(found.certificate)[0] == facts_in(run.certificate)[0] and "a lie" not in str(found.certificate)
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "why"),
+    [
+        ("proof.facts", "all is well", "facts are 'all is well': expected a list"),
+        ("proof.unbreakable_rows", [[99, 0]], r"unbreakable is \[\[99, 0\]\]: expected \(u, 2\)"),
+        ("optimality", 7, "optimality is 7: expected an object"),
+    ],
+)
+def test_a_certificate_that_is_none_is_refused_and_the_mend_works(finished, unvouched, entry, value, why):
+    edited(unvouched / "certificate.json", **{entry: value})
+    with pytest.raises(RunIncomplete, match=why):
+        read_run(unvouched)
+    (unvouched / "certificate.json").unlink()
+    recover_and_retrain(asked(), unvouched)
+    assert read_run(unvouched).certificate == read_run(finished).certificate
 
 
 def test_values_by_episodes_are_said_to_be_the_record_s(run):
@@ -102,7 +126,7 @@ EDITS = {
         "policies.random.value": (0.0, r"table\.npz"), "policies.expert.value": (2.0, r"expert\.npz"),
         "policies.retrained.value": (0.9, r"agent_policy\.npz"),
     },
-    "certificate.json": {"duality_gap": (0.5, r"certificate\.json"), "zero": (True, r"certificate\.json")},
+    "certificate.json": {"proof.duality_gap": (0.5, r"certificate\.json"), "optimality.zero": (True, r"certificate\.json")},
     "config.json": {"learner.type": ("FeatureLP", r"config\.json"), "epsilon": (0.1, r"config\.json")},
 }  # fmt: skip
 
@@ -119,7 +143,7 @@ def test_an_entry_that_other_files_contradict_is_named_with_them(copied, name, e
     ("name", "entry", "value", "gone"),
     [
         ("metrics.json", "reward.status", "Perfect", ["metrics.json"]),
-        ("certificate.json", "objective", 7.0, ["certificate.json", "metrics.json"]),
+        ("certificate.json", "proof.objective", 7.0, ["certificate.json", "metrics.json"]),
         ("environment.json", "id", "Theirs-v0", ["environment.json"]),
     ],
 )

@@ -20,9 +20,9 @@ from irl_gym.comparisons import Comparisons, as_compared, compare
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import InvalidParameter
 from irl_gym.howard import as_told
-from irl_gym.learners.feature_rows import completed
 from irl_gym.margins import least_per_state, margins_of
 from irl_gym.mdp import TabularMDP, checked_mdp
+from irl_gym.policies import completed
 from irl_gym.rewards import TabularReward, as_reward
 
 

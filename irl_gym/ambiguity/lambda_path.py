@@ -26,10 +26,10 @@ from irl_gym.ambiguity.widths import served_actions
 from irl_gym.checks import checked_number
 from irl_gym.deadline import Deadline
 from irl_gym.errors import DegenerateExpert, InvalidPolicy, InvalidReward
-from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
 from irl_gym.mdp import TabularMDP, checked_mdp
+from irl_gym.policies import completed
 from irl_gym.rewards import TabularReward, read_archive, write_archive
 
 FORMAT = "irl_gym.LambdaPath/1"

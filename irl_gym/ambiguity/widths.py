@@ -32,6 +32,7 @@ from irl_gym.errors import InvalidParameter, SolverInfeasible
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import certify
 
 Pins = Mapping[Any, float]
 """State, or (state, action), -> its reward."""
@@ -156,8 +157,9 @@ def served_actions(learner: FiniteLP, mdp: TabularMDP, expert: Any) -> tuple[Act
     Raises:
         DegenerateExpert: there are none.
     """
-    certificate = replace(learner, l1=0.0, margin_cap="auto").fit(mdp, expert).certificate
-    return certificate.served(mdp.n_actions), certificate.margin_cap or 0.0
+    found = replace(learner, l1=0.0, margin_cap="auto").fit(mdp, expert)
+    margin = certify(mdp, expert, found.reward, unbreakable=found.proof.unbreakable_rows).margin
+    return found.proof.served(margin, mdp.n_actions), found.proof.margin_cap or 0.0
 
 
 def _half_of_largest(the_set: RewardSet, pinned: Any, r_max: float, deadline: Deadline) -> float:

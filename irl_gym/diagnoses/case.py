@@ -1,7 +1,7 @@
-"""The evidence that the doctor works on: a table, an expert, a reward, and what the learner's certificate says.
+"""The evidence that the doctor works on: a table, an expert, a reward, and what the learner's proof says.
 
 It can be made of a result in memory and of a run's folder alike. What follows from P, the expert and R is computed here again;
-of the certificate are taken only what it alone knows: the terms of the program, its bound, and sampled values.
+of the proof is taken only what it alone knows: the terms of the program, its bound, and sampled values.
 Axes: S states, A actions, n rows of (4) among the reachable states in which the expert is known.
 """
 
@@ -19,12 +19,12 @@ from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.howard import Optimum
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.feature_rows import completed
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.margins import Margins, best_margins, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import Tie, ties_of, worst_tie
-from irl_gym.policies import as_distribution
+from irl_gym.optimality import certify
+from irl_gym.policies import as_distribution, completed
 from irl_gym.rewards import TabularReward
 
 SMALL = 2_000
@@ -81,7 +81,7 @@ class Case:
     reward: TabularReward | None = None
     """R in the table; None where no reward came out, or there is no table."""
     claims: Mapping[str, Any] = field(default_factory=dict)
-    """The certificate's `to_json()`; empty where there is none."""
+    """What a certificate says, by name (`certificates.claims_in`), or a proof's `to_json()`; empty where there is neither."""
     status: str = ""
     """What became of the program, in a sentence."""
     stats: Mapping[str, Any] = field(default_factory=dict)
@@ -202,8 +202,9 @@ class Case:
         margins = Margins(nothing, nothing, nothing, nothing)
         if self.reward is not None:
             found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
-            # What follows an unknown state is worth what acting best is, as in `learners.soft_certificate`.
-            margins = margins_of(found, c) if self.fully_known else best_margins(found, c)
+            # What follows an unknown state is worth what acting best is, as in `optimality`.
+            taken = self.fully_known and not self.claims.get("errs")  # at its word
+            margins = margins_of(found, c) if taken else best_margins(found, c)
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
         usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
@@ -211,7 +212,7 @@ class Case:
 
     @property
     def _kept(self) -> np.ndarray:
-        """(n,) rows that a margin is taken over: those that the certificate lists as unbreakable are left out one by one."""
+        """(n,) rows that a margin is taken over: those that the proof lists as unbreakable are left out one by one."""
         assert self.rows is not None
         pairs = np.array(self.claims.get("unbreakable_rows") or np.zeros((0, 2)), dtype=np.int64)
         n = self.distribution.shape[1]
@@ -283,7 +284,10 @@ class Case:
         """(S, A) rows of (4) that some reward makes strict; None where that is not known."""
         if self.best is None or isinstance(self.best, DegenerateExpert):
             return None
-        return self.best.certificate.served(self.distribution.shape[1])
+        assert self.mdp is not None
+        proof = self.best.proof
+        margin = certify(self.mdp, self.expert, self.best.reward, unbreakable=proof.unbreakable_rows).margin
+        return proof.served(margin, self.mdp.n_actions)
 
     @cached_property
     def best(self) -> IRLResult | DegenerateExpert | None:

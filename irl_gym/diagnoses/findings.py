@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
+from irl_gym.facts import counted as counted
 
 MOST_NAMED = 5
 """States that a sentence names; the others are counted."""
@@ -82,8 +83,3 @@ def named(states: np.ndarray, actions: np.ndarray | None = None) -> str:
     told = [f"s={s}" for s in states] if actions is None else [f"s={s} a={a}" for s, a in zip(states, actions, strict=True)]
     more = len(told) - MOST_NAMED
     return ", ".join(told) if more <= 0 else f"{', '.join(told[:MOST_NAMED])} and {more:,} more"
-
-
-def counted(count: int, what: str = "state") -> str:
-    """A number with its noun."""
-    return f"{count:,} {what}{'' if count == 1 else 's'}"

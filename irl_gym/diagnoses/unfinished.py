@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.certificates import claims_in, read_certificate
 from irl_gym.claims import FIRST
 from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent
@@ -36,7 +37,7 @@ def left_behind(path: Path) -> Case | None:
         record = _maybe(path / RECORDS / "reward.json")
         learned = load_reward(path / "reward.npz") if record else None
         expert = _expert(path, config, table)
-        claims = _maybe(path / "certificate.json") if record else {}
+        claims = claims_in(read_certificate(path / "certificate.json")) if record else {}
     except (OSError, *SURPRISES, IrlGymError):
         return None
     reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned

@@ -1,1 +1,1 @@
-"""Learners: frozen records of hyper-parameters that turn an MDP and an expert into a reward with a certificate."""
+"""Learners: frozen records of hyper-parameters that turn an MDP and an expert into a reward with a proof."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from irl_gym.checks import checked_number
+from irl_gym.facts import Fact
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
@@ -14,7 +15,7 @@ from irl_gym.solvers import Status, check_solving
 
 @runtime_checkable
 class Proof(Protocol):
-    """What every certificate tells; each learner's says more."""
+    """What every learner proves of its program; each learner's says more."""
 
     @property
     def objective(self) -> float:
@@ -26,9 +27,8 @@ class Proof(Protocol):
         """How far the reward can be from the program's optimum."""
         ...
 
-    @property
-    def degenerate(self) -> bool:
-        """Does the reward say nothing: is the expert tied with everything?"""
+    def facts(self) -> tuple[Fact, ...]:
+        """What it says, in sentences."""
         ...
 
     def to_json(self) -> dict[str, Any]:
@@ -42,24 +42,27 @@ AnyProof = TypeVar("AnyProof", bound=Proof)
 
 @dataclass(frozen=True, eq=False)
 class IRLResult(Generic[AnyReward, AnyProof]):
-    """A learned reward and what it proves."""
+    """A learned reward, and what the learner proves of it."""
 
     reward: AnyReward
     """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
     status: Status
     """What became of the program, in a sentence."""
-    objective: float
-    """The program's objective, recomputed from the reward."""
-    certificate: AnyProof
-    """What the reward proves: a Certificate of FiniteLP, or another `Proof`."""
+    proof: AnyProof
+    """What the learner proves of its program, such as a FiniteProof; what the reward says of the expert, `certify` tells."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, seconds, iterations, program by program."""
     policy: Policy | None = None
     """A policy planned for the reward, where learning made one."""
 
+    def facts(self) -> tuple[Fact, ...]:
+        """What became of the program, and what the proof says."""
+        mood = "plain" if self.status is Status.OPTIMAL else "open" if self.status is Status.INACCURATE else "bad"
+        return (Fact("status of the program", self.status.value, mood), *self.proof.facts())
+
     def record(self) -> dict[str, Any]:
         """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""
-        return without_nan({"status": self.status.value, "objective": self.objective, "stats": dict(self.stats)})
+        return without_nan({"status": self.status.value, "stats": dict(self.stats)})
 
 
 @runtime_checkable

@@ -37,14 +37,14 @@ from irl_gym.features import FeatureMap, as_features, check_length
 from irl_gym.generative import GenerativeModel, least_horizon, truncation_bound
 from irl_gym.killable import within
 from irl_gym.learners.base import IRLResult, check_weighing
-from irl_gym.learners.feature_certificate import FeatureCertificate, Judged, judge_table
 from irl_gym.learners.feature_program import NOTHING, SolvedFeatures, solve_features
-from irl_gym.learners.feature_rows import FeatureRows, chosen_states, completed, rows_of_model, rows_of_table
+from irl_gym.learners.feature_proof import FeatureProof, SampledFeatureProof
+from irl_gym.learners.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
 from irl_gym.learners.weights import Weights
 from irl_gym.linear_reward import LinearReward
 from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
-from irl_gym.policies import Policy
+from irl_gym.policies import Policy, completed
 from irl_gym.solvers import SolverName, Solving
 from irl_gym.states import States
 
@@ -78,7 +78,7 @@ class FeatureLP:
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for the whole fit: all its programs, all attempts at them, and the certificate, together; None for no limit.
+    """Seconds for the whole fit: all its programs, all attempts at them, and the proof, together; None for no limit.
     Kept within a fifth, as `FiniteLP.time_limit` is; a caller's features are not cut."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
@@ -98,7 +98,7 @@ class FeatureLP:
 
     def fit(
         self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None
-    ) -> IRLResult[LinearReward, FeatureCertificate]:
+    ) -> IRLResult[LinearReward, FeatureProof]:
         """Learn the weights of a reward under which the expert is optimal, or violates (10) least.
 
         Args:
@@ -135,7 +135,7 @@ class FeatureLP:
 
     def _fit_table(
         self, mdp: TabularMDP, expert: Any, states: States | None, solving: Solving
-    ) -> IRLResult[LinearReward, FeatureCertificate]:
+    ) -> IRLResult[LinearReward, FeatureProof]:
         if states is not None and not isinstance(states, States):
             raise InvalidParameter(
                 f"states is {states!r}: expected a numbering, such as `tabulate(...).states`, or None for rows."
@@ -151,16 +151,10 @@ class FeatureLP:
         chosen = chosen_states(mdp, expert, S_0, np.random.default_rng(self.seed), known)
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted, printed=self.trivial_rows == "as printed")
         solved = solve_features(self, found, solving)
-        weights = solved.weights
-        reward = self._reward(weights)
-        tabular = reward.tabular(mdp.n_states if states is None else states)
-        judged = judge_table(mdp, expert, known, tabular, found.pairs(solved.ties))
-        certificate = self._certificate(found, solved, judged, None)
-        return IRLResult(reward, solved.status, certificate.objective, certificate, self._stats(weights, found))
+        proof = FeatureProof(**self._proved(found, solved))
+        return IRLResult(self._reward(solved.weights), solved.status, proof, self._stats(solved.weights, found))
 
-    def _fit_model(
-        self, model: GenerativeModel, expert: Policy, solving: Solving
-    ) -> IRLResult[LinearReward, FeatureCertificate]:
+    def _fit_model(self, model: GenerativeModel, expert: Policy, solving: Solving) -> IRLResult[LinearReward, FeatureProof]:
         if not isinstance(expert, Policy):
             raise InvalidPolicy(
                 f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
@@ -187,17 +181,18 @@ class FeatureLP:
             spread = (found.batches @ weights.alpha).std(axis=0, ddof=1) / np.sqrt(len(found.batches))
             error = float(spread.max())
             tolerance[found.states] += 2 * spread[found.rows.active(weights.alpha, 1.0)[0]]
-        judged = Judged(
-            margin,
-            short,
-            tolerance,
-            bool(np.abs(values).max() <= NOTHING * found.rows.scale),
+        violated = np.flatnonzero(short > tolerance)
+        proof = SampledFeatureProof(
+            **self._proved(found, solved),
+            expert_optimal=not violated.size,
+            worst_violation=float(short.max(initial=0.0)),
+            margin=margin,
+            violated=violated,
+            indifferent=bool(np.abs(values).max() <= NOTHING * found.rows.scale),
+            standard_error=error,
         )
-        certificate = self._certificate(found, solved, judged, error)
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
-        return IRLResult(
-            self._reward(weights), solved.status, certificate.objective, certificate, self._stats(weights, found) | extra
-        )
+        return IRLResult(self._reward(weights), solved.status, proof, self._stats(weights, found) | extra)
 
     def _states_of(self, model: GenerativeModel) -> np.ndarray:
         """(m, d) S_0 of a generative model."""
@@ -225,40 +220,24 @@ class FeatureLP:
     def _reward(self, weights: Weights) -> LinearReward:
         return LinearReward(weights.alpha, self.phi, {"learner": "FeatureLP", "scaling": self.phi.scaling})
 
-    def _certificate(
-        self, found: FeatureRows, solved: SolvedFeatures, judged: Judged, error: float | None
-    ) -> FeatureCertificate:
+    def _proved(self, found: FeatureRows, solved: SolvedFeatures) -> dict[str, Any]:
+        """The fields of a proof, of a table or of a generative model."""
         rows, alpha = found.rows, solved.weights.alpha
-        violated, pairs = np.flatnonzero(judged.short > judged.tolerance), found.pairs(solved.ties)
-        loss = judged.loss
-        return FeatureCertificate(
-            expert_optimal=not violated.size if loss is None else loss.optimal,
-            loss_low=None if loss is None else loss.low,
-            loss_bound=None if loss is None else loss.high,
-            loss_share=None if loss is None else loss.share,
-            worst_violation=float(judged.short.max(initial=0.0)),
-            margin=judged.margin,
-            violated=violated,
-            unbreakable=np.unique(pairs[:, 0]),
-            unbreakable_rows=pairs,
-            objective=solved.objective,
-            dual_bound=solved.bound,
-            penalty=float(self.penalty),
-            margin_cap=solved.cap,
-            l1=float(self.l1),
-            alpha_l1_norm=float(np.abs(alpha).sum()),
-            states=int(np.unique(found.states).size),
-            trivial=found.trivial,
-            rank=rows.rank,
-            n_features=rows.d.shape[1],
-            expressible=solved.expressible,
-            zero=not alpha.any(),
-            indifferent=judged.indifferent,
-            standard_error=error,
-            unknown=judged.unknown,
-            sampling_error=judged.sampling_error,
-            unsettled=judged.unsettled,
-        )
+        return {
+            "objective": solved.objective,
+            "dual_bound": solved.bound,
+            "penalty": float(self.penalty),
+            "margin_cap": solved.cap,
+            "l1": float(self.l1),
+            "alpha_l1_norm": float(np.abs(alpha).sum()),
+            "states": int(np.unique(found.states).size),
+            "trivial": found.trivial,
+            "rank": rows.rank,
+            "n_features": rows.d.shape[1],
+            "expressible": solved.expressible,
+            "zero": not alpha.any(),
+            "unbreakable_rows": found.pairs(solved.ties),
+        }
 
     def _stats(self, weights: Weights, found: FeatureRows) -> dict[str, Any]:
         return {"programs": {"weights": weights.answer.to_json()}, "rows": len(found.rows.groups)}

@@ -15,12 +15,12 @@ import numpy as np
 from irl_gym.checks import checked_number
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.discounted import Discounted
-from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
+from irl_gym.errors import DegenerateExpert, InvalidParameter
 from irl_gym.features import FeatureMap, over_rows
 from irl_gym.generative import GenerativeModel
 from irl_gym.learners.weights import Rows
 from irl_gym.mdp import TabularMDP
-from irl_gym.policies import Policy, policy_array
+from irl_gym.policies import Policy
 
 BLOCK = 1 << 24
 """Numbers of V_i held at a time: 128 MB, and as much again for phi."""
@@ -71,17 +71,6 @@ class FeatureRows:
         order = np.argsort(numbers, kind="stable")
         zeros = np.zeros((theirs.size, d.shape[1]))
         return Rows(np.concatenate([d[~ties], d[ties], zeros])[order], numbers[order])
-
-
-def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
-    """An expert with random actions where nothing is known of it, and (S,) where something is."""
-    array = policy_array(expert)
-    if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
-        return expert, np.ones(n_states, dtype=bool)
-    unknown = np.asarray(np.isnan(array).all(axis=1))
-    if unknown.all():
-        raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
-    return np.where(unknown[:, None], 1 / array.shape[1], array), np.logical_not(unknown)
 
 
 def chosen_states(

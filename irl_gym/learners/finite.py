@@ -19,7 +19,7 @@ no unknown state is worth more than it earns.
 `unvisited="avoid"`  (default) unknown states have the lowest reward that the margins allow, so an agent that strays into them
     returns to what the expert was seen to do. It is a choice, not knowledge: nothing says that these states are bad.
 `slack=C`  a violation of (4) costs C, where a margin is worth 1, both in proportion to `visits`. With C large the rows are hard
-    again wherever they can hold. The certificate lists the rows that are violated.
+    again wherever they can hold. `irl_gym.certify` lists the rows that are violated.
     Actions that the expert takes too, when it takes several, have to be as good: what violates that costs C as well, and adds
     nothing to a margin.
 Axes: S states, A actions.
@@ -30,19 +30,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym.certificate import Certificate, certify
 from irl_gym.checks import checked_number, float_array, is_word
 from irl_gym.comparisons import Comparisons, compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
 from irl_gym.killable import within
 from irl_gym.learners import programs
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.feature_rows import completed
+from irl_gym.learners.finite_proof import FiniteProof, prove
 from irl_gym.learners.partial import PartialTask
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved
 from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.margins import row_margins
 from irl_gym.mdp import TabularMDP, checked_mdp
+from irl_gym.policies import completed
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import SolverName, Solving, Status, check_solving
 
@@ -64,11 +64,11 @@ class FiniteLP:
     reward_on: RewardOn = "state"
     """"state" for R(s) as in the paper; "state-action" for R(s, a), when no R(s) singles the expert out."""
     report_lambda_0: bool = False
-    """Compute lambda_0 for the certificate even when l1 is 0: one more LP."""
+    """Compute lambda_0 for the proof even when l1 is 0: one more LP."""
     solver: SolverName = "auto"
     """"auto" chooses by size; see `irl_gym.solvers`."""
     time_limit: float | None = None
-    """Seconds for the whole fit: all its programs, all attempts at them, and the certificate, together; None for no limit.
+    """Seconds for the whole fit: all its programs, all attempts at them, and the proof, together; None for no limit.
     Kept within a fifth, also where factors fill up: what could be long works in a process that is ended then (`killable`). What
     no clock is looked at for is the making of the matrices, about a second for a million entries."""
     slack: float | None = None
@@ -95,16 +95,15 @@ class FiniteLP:
                     "some reward and no row needs slack."
                 )
 
-    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> IRLResult[TabularReward, Certificate]:
+    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> IRLResult[TabularReward, FiniteProof]:
         """Learn a reward under which the expert is optimal.
 
         Args:
             mdp: only states reachable from d0 get a reward; the others get 0 and are not judged.
             expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions. Rows of NaN say that nothing is known
                 of the expert in a state, as in the tables of `irl_gym.demonstrated`: such a state has no row of (4).
-            visits: (S,) how often the expert was seen in each state: what its margin and its violation count for, and what
-                the certificate says of violated rows. Where the expert is known everywhere and slack is None they change
-                nothing.
+            visits: (S,) how often the expert was seen in each state: what its margin and its violation count for. Where the
+                expert is known everywhere and slack is None they change nothing.
 
         Raises:
             InvalidPolicy: an expert of the wrong shape or content.
@@ -118,7 +117,7 @@ class FiniteLP:
 
     def _fit(
         self, mdp: TabularMDP, expert: Any, visits: np.ndarray | None, solving: Solving
-    ) -> IRLResult[TabularReward, Certificate]:
+    ) -> IRLResult[TabularReward, FiniteProof]:
         known_expert, known = completed(expert, mdp.n_states)
         acting = mdp.reachable & ~mdp.terminal
         visits = _checked_visits(visits, known & acting)
@@ -141,7 +140,7 @@ class FiniteLP:
                 solved, y = (result := programs.ng_russell(task.program(), self.r_max, l1, cap)), result.y
         task.record("reward", solved)
         result = task.result(solved, l1=l1, lambda_0=lambda_0, margin_cap=cap, y=y, y_l1=y_l1)
-        if l1 == 0 and result.objective <= NO_MARGIN * min(self.r_max, cap or np.inf):
+        if l1 == 0 and result.proof.objective <= NO_MARGIN * min(self.r_max, cap or np.inf):
             raise task.degenerate()
         return result
 
@@ -285,12 +284,12 @@ class _Task:
             f"{self.comparisons.caveat if self.learner.reward_on == 'state' else ''}"
         )
 
-    def result(self, solved: Solved, **proof: Any) -> IRLResult[TabularReward, Certificate]:
+    def result(self, solved: Solved, **proof: Any) -> IRLResult[TabularReward, FiniteProof]:
         values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R
         reward = TabularReward.learned(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
-        terms = {"r_max": self.learner.r_max, "counted": self.counted, "unbreakable": self.unbreakable}
-        certificate = certify(self.mdp, self.expert, reward, **terms, **proof)
-        status = Status.ZERO if certificate.zero else solved.answer.status
-        return IRLResult(reward, status, certificate.objective, certificate, self.stats)
+        never = self.comparisons.pairs(self.rows, np.flatnonzero(self.unbreakable))
+        terms = {"r_max": self.learner.r_max, "unbreakable_rows": never, **proof}
+        found = prove(self.part, self.comparisons, reward.of_rows(self.rows), self.counted, **terms)
+        return IRLResult(reward, Status.ZERO if found.zero else solved.answer.status, found, self.stats)

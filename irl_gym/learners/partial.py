@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from irl_gym.certificate import Certificate
 from irl_gym.comparisons import compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverInfeasible
 from irl_gym.learners.base import IRLResult
+from irl_gym.learners.finite_proof import FiniteProof
 from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN
 from irl_gym.learners.soft import Found, PartlyKnown, SoftProgram
-from irl_gym.learners.soft_certificate import Terms, certify_partly
+from irl_gym.learners.soft_proof import Terms, prove_partly
 from irl_gym.learners.strict_rows import strict_rows
 from irl_gym.margins import least_per_state
 from irl_gym.mdp import TabularMDP
@@ -36,7 +36,7 @@ GIVEN_UP = 1e-6
 """A violation above this, in units of those margins, gives a state's rows up."""
 LEEWAYS = (1e-8, 1e-7, 1e-6)
 """What the simplest reward may leave of the best one's margins, in their unit: without it no interior is left. The next where
-the solver finds none. The certificate's gap includes it."""
+the solver finds none. The proof's gap includes it."""
 
 
 class PartialTask:
@@ -58,7 +58,7 @@ class PartialTask:
         self, learner: "FiniteLP", mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None,
         solving: Solving,
     ):  # fmt: skip
-        self.learner, self.mdp, self.visits, self.solving = learner, mdp, visits, solving
+        self.learner, self.mdp, self.solving = learner, mdp, solving
         mdp.mixing(distribution)  # checks all states
         self.rows = np.flatnonzero(mdp.reachable)
         part = mdp.restrict(self.rows)
@@ -92,7 +92,7 @@ class PartialTask:
         learner = self.learner
         return SoftProgram(self.partly, learner.reward_on, self.counted, learner.slack if soft else None, self.solving)
 
-    def fit(self) -> IRLResult[TabularReward, Certificate]:
+    def fit(self) -> IRLResult[TabularReward, FiniteProof]:
         """Learn the reward."""
         learner, r_max = self.learner, self.learner.r_max
         cap, need = self.settle()
@@ -249,17 +249,14 @@ class PartialTask:
 
     def _result(
         self, found: Found, unit: float, bound: float, terms: Terms, lambda_0: float | None
-    ) -> IRLResult[TabularReward, Certificate]:
+    ) -> IRLResult[TabularReward, FiniteProof]:
         learner = self.learner
         values = np.zeros((self.mdp.n_states, *found.R.shape[1:]))
         if np.abs(found.R).max() * unit > NO_MARGIN * learner.r_max:
             values[self.rows] = np.clip(found.R * unit, -learner.r_max, learner.r_max)
         note = {"learner": "FiniteLP", "reward_on": learner.reward_on, "unvisited": learner.unvisited}
         reward = TabularReward.learned(values, note)
-        certificate = certify_partly(
-            self.mdp, self.partly, self.rows, reward, terms, bound=bound, lambda_0=lambda_0, visits=self.visits
-        )
-        if terms.l1 == 0 and certificate.objective <= NO_MARGIN * min(learner.r_max, terms.cap or np.inf):
+        proof = prove_partly(self.partly, self.rows, reward, terms, bound=bound, lambda_0=lambda_0)
+        if terms.l1 == 0 and proof.objective <= NO_MARGIN * min(learner.r_max, terms.cap or np.inf):
             raise self.degenerate()
-        status = Status.ZERO if certificate.zero else found.answer.status
-        return IRLResult(reward, status, certificate.objective, certificate, self.stats)
+        return IRLResult(reward, Status.ZERO if proof.zero else found.answer.status, proof, self.stats)

@@ -31,7 +31,7 @@ from irl_gym.killable import within
 from irl_gym.learners.base import IRLResult, check_weighing
 from irl_gym.learners.estimates import Estimate, nearest, usable
 from irl_gym.learners.expressible import uniform_margin
-from irl_gym.learners.trajectory_certificate import TrajectoryCertificate
+from irl_gym.learners.trajectory_proof import TrajectoryProof
 from irl_gym.learners.weights import Rows, Weights, best_weights
 from irl_gym.linear_reward import LinearReward
 from irl_gym.policies import Policy
@@ -108,7 +108,7 @@ class TrajectoryLP:
         """The features, as a map."""
         return as_features(self.features)
 
-    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult[LinearReward, TrajectoryCertificate]:
+    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult[LinearReward, TrajectoryProof]:
         """The best round: the one whose policy is nearest to the expert in the features.
 
         Stops after `max_rounds`, when `patience` rounds have not come nearer, or when a policy cannot be told from the expert:
@@ -124,19 +124,19 @@ class TrajectoryLP:
             InvalidFeatures: what the features give is not (N, K) finite numbers.
             SolverTimeout, SolverFailed: no answer.
         """
-        results: list[IRLResult[LinearReward, TrajectoryCertificate]] = []
+        results: list[IRLResult[LinearReward, TrajectoryProof]] = []
         best = 0
         for result in self.iterate(world, episodes):
             results.append(result)
-            proofs = [one.certificate for one in results]
+            proofs = [one.proof for one in results]
             best, enough = nearest([p.distance for p in proofs], [p.distance_error for p in proofs], self.patience)
-            if enough or result.certificate.zero:
+            if enough or result.proof.zero:
                 break
-        history = [{key: one.stats[key] for key in ROUND} | {"distance": one.certificate.distance} for one in results]
+        history = [{key: one.stats[key] for key in ROUND} | {"distance": one.proof.distance} for one in results]
         stats = {**results[best].stats, "best_round": best + 1, "best_by": "distance", "rounds": history}
-        return replace(results[best], stats=stats)
+        return replace(results[best], proof=replace(results[best].proof, rounds=len(results)), stats=stats)
 
-    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult[LinearReward, TrajectoryCertificate]]:
+    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult[LinearReward, TrajectoryProof]]:
         """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
         if not isinstance(world, World):
             raise InvalidParameter(
@@ -159,18 +159,18 @@ class TrajectoryLP:
                 sums = world.sums(policy, self.phi, self.trajectories, horizon=horizon, seed=self.seed + number)
             newest = Estimate.of(sums)
             cut = truncation_bound(world.gamma, horizon, r_unit)
-            certificate = self._certificate(rows, weights, program, theirs, found, newest, horizon, cut)
+            proof = self._proof(rows, weights, program, theirs, found, newest, horizon, cut)
             status = weights.answer.status if weights.alpha.any() else Status.ZERO_WEIGHTS
             stats = {
                 "round": number,
-                "regret": certificate.regret,
-                "regret_error": certificate.regret_error,
-                "objective": certificate.objective,
+                "regret": proof.regret,
+                "regret_error": proof.regret_error,
+                "objective": proof.objective,
                 "seconds_solving": weights.answer.seconds,
                 "expert_episodes": len(expert.episodes),
                 "episodes_dropped": expert.dropped,
             }
-            yield IRLResult(reward, status, certificate.objective, certificate, stats, policy)
+            yield IRLResult(reward, status, proof, stats, policy)
             found.append(newest)
 
     def _largest(self, expert: list[Episode]) -> float:
@@ -182,7 +182,7 @@ class TrajectoryLP:
         uniform = uniform_margin(rows, solving=solving) if self.gap_cap == "auto" else 0.0
         return uniform / 2 if uniform > 0 else np.inf
 
-    def _certificate(
+    def _proof(
         self,
         rows: Rows,
         weights: Weights,
@@ -192,7 +192,7 @@ class TrajectoryLP:
         newest: Estimate,
         horizon: int,
         cut: float,
-    ) -> TrajectoryCertificate:
+    ) -> TrajectoryProof:
         alpha = weights.alpha
 
         def error(other: Estimate) -> float:
@@ -200,7 +200,7 @@ class TrajectoryLP:
 
         difference = theirs.mean - newest.mean
         noise = np.sqrt(theirs.variances + newest.variances)
-        return TrajectoryCertificate(
+        return TrajectoryProof(
             gaps=rows.d @ alpha,
             gap_errors=np.array([error(one) for one in found]),
             regret=float(-difference @ alpha),
@@ -218,6 +218,8 @@ class TrajectoryLP:
             horizon=horizon,
             truncation=cut,
             zero=not alpha.any(),
+            round=len(found),
+            rounds=None,
         )
 
 

@@ -27,6 +27,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import optimal_actions
 from irl_gym.ng_russell_2000.records import Check, Progress, at_most, near, reported
+from irl_gym.optimality import certify
 from irl_gym.tabulate import make, tabulate
 from irl_gym.tabulation import Tabulation
 
@@ -166,11 +167,12 @@ class Outcome1:
         """Against the paper."""
         free, penalised = self.panels
         away = penalised[self.true == 0]
-        gap = max(one.certificate.duality_gap for one in (self.free, self.penalised))
-        violation = max(one.certificate.worst_violation for one in (self.free, self.penalised))
+        gap = max(one.proof.duality_gap for one in (self.free, self.penalised))
+        rewards = self.free.reward, self.penalised.reward
+        violation = max(certify(self.table.mdp, self.expert, one).worst_violation for one in rewards)
         return (
             at_most("lambda = 0: farthest from the printed panel", 0.0, np.abs(free - PRINTED).max(), RESOLUTION),
-            near("lambda = 0: objective (target, not printed)", PRINTED_OBJECTIVE, self.free.objective, 5e-5),
+            near("lambda = 0: objective (target, not printed)", PRINTED_OBJECTIVE, self.free.proof.objective, 5e-5),
             near("lambda_0 (target; printed: 1.05, just below)", PRINTED_LAMBDA_0, self.lambda_0, 5e-6),
             near(f"lambda = {self.settings.l1}: reward of the goal", 1.0, penalised[self.true == 1][0], 1e-6),
             reported(f"lambda = {self.settings.l1}: largest |R| elsewhere", "near 0", np.abs(away).max()),
@@ -187,7 +189,7 @@ class Outcome1:
             "expert": self.expert.reshape(5, 5).tolist(),
             "reward_lambda_0": free.tolist(),
             "reward_penalised": penalised.tolist(),
-            "objectives": [self.free.objective, self.penalised.objective],
+            "objectives": [self.free.proof.objective, self.penalised.proof.objective],
             "lambda_0": self.lambda_0,
             "checks": [one.to_json() for one in self.checks],
         }

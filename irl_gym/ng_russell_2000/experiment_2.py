@@ -31,6 +31,7 @@ from irl_gym.learners.feature import FeatureLP
 from irl_gym.mdp import TabularMDP
 from irl_gym.ng_russell_2000.driving import Drive, drive
 from irl_gym.ng_russell_2000.records import Check, Progress, at_least, at_most, near, reported
+from irl_gym.optimality import certify
 from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.tabulate import make
 from irl_gym.tabulation import Tabulation
@@ -110,6 +111,7 @@ class Experiment2:
         road = np.linspace(*ROAD, self.points)
         observations = np.stack([road, np.zeros(self.points)], axis=1)
         rewards: list[Any] = [one.reward for one in results]
+        broken = [certify(mdp, expert, one.tabular(table.states)).violated.size / acting.sum() for one in rewards]
         return Fits(
             env=env,
             table=replace(table, mdp=mdp),
@@ -117,6 +119,7 @@ class Experiment2:
             tied=float((several.sum(axis=1) > 1)[acting].mean()),
             steps=float(-solution.V.min()) if task == "reach" else 0.0,
             results=tuple(results),
+            violated=np.array(broken),
             road=road,
             R=np.array([one.of(observations) for one in rewards]),
         )
@@ -168,6 +171,8 @@ class Fits:
     """"reach": the steps that the worst cell takes."""
     results: tuple[IRLResult, ...]
     """n."""
+    violated: np.ndarray
+    """(n,) share of all cells in which (4) is violated."""
     road: np.ndarray
     """(N,) positions."""
     R: np.ndarray
@@ -183,12 +188,6 @@ class Fits:
     def at_bound(self) -> np.ndarray:
         """(n,) features with alpha = -1."""
         return (self.alpha <= -1 + 1e-4).sum(axis=1)
-
-    @property
-    def violated(self) -> np.ndarray:
-        """(n,) share of all cells in which (4) is violated."""
-        cells = (~self.table.mdp.terminal).sum()
-        return np.array([one.certificate.violated.size / cells for one in self.results])
 
     def hump(self, run: int) -> tuple[float, float]:
         """Zeros of R left and right of the middle of the interval; NaN where R is not above 0 there."""
@@ -270,7 +269,7 @@ class Outcome2:
                 "alpha": one.alpha.tolist(),
                 "road": one.road.tolist(),
                 "R": one.R.tolist(),
-                "objective": [float(result.objective) for result in one.results],
+                "objective": [float(result.proof.objective) for result in one.results],
                 "violated": one.violated.tolist(),
                 "tied": one.tied,
             }

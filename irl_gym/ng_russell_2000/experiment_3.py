@@ -124,7 +124,7 @@ class Experiment3:
         for number, result in enumerate(learner.iterate(simulator, episodes)):
             policy: Any = result.policy
             value, _ = world.value(policy, self.trials)
-            proof = result.certificate
+            proof = result.proof
             lines.append((value, *world.compare(policy), proof.distance, proof.distance_error, proof.regret))
             report((number + 1) / self.rounds)
         value, differ, worse, distance, noise, regret = np.array(lines).T

@@ -9,21 +9,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
+from irl_gym.certificates import facts_in
 from irl_gym.errors import InvalidParameter
-from irl_gym.page import compared, panels
+from irl_gym.page import compared
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
 from irl_gym.page.pooled import over_seeds
-from irl_gym.page.proof import ROUNDING, answer, finding
+from irl_gym.page.proof import answer, finding
 from irl_gym.page.ranked import learning, sentence
 from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.worlds import one_world, run_places, run_title
-from irl_gym.page.written import counted, number, percent, seconds
+from irl_gym.page.written import counted, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.run_folder import SURPRISES
 from irl_gym.run_reader import not_understood
@@ -129,8 +128,6 @@ def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
             yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
     whose = "" if run.recomputed else ", as recorded"
     yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
-    if "on_table" in reward:
-        yield "expert optimal under it, judged on the table", reward["on_table"]
     if told["retrained"]["score"] is not None:
         steps = run.metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
@@ -208,34 +205,13 @@ def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield from _leaves(value, f"{prefix}.{key}" if prefix else str(key))
 
 
-CERTIFIED = {
-    "objective": "objective", "duality_gap": "at most below the best possible", "l1": "lambda", "lambda_0": "lambda_0",
-    "margin_cap": "margin cap", "l1_norm": "||R||_1", "least_l1_norm": "least ||R||_1 with these margins",
-    "distance": "distance to the expert", "rank": "rank of the rows",
-}  # fmt: skip
-"""Of a certificate's json, with what it is called."""
-
-
 def _proofs(named: Mapping[str, Run]) -> Section:
-    """The numbers of the certificates."""
-    held = [run.certificate for run in named.values()]
-    rows = [
-        [told, *(_proof(one, key) for one in held)]
-        for key, told in CERTIFIED.items()
-        if any(one.get(key) is not None for one in held)
-    ]
-    margins = [np.array([one for one in cert.get("margin", []) if one is not None], dtype=float) for cert in held]
-    if any(one.size for one in margins):
-        rows.append(["margins", *(panels.spread(one) if one.size else NONE for one in margins)])
-    return _table("certificate", "Certificates", "What each run recorded of its reward as it learned it.", named, rows)
-
-
-def _proof(held: Mapping[str, Any], key: str) -> str:
-    """A number of a certificate, in words where it has none: without a cap is the paper's own program."""
-    if held.get(key) is None:
-        return "none" if key == "margin_cap" and key in held else NONE
-    rounding = key == "duality_gap" and held[key] <= ROUNDING * max(1.0, abs(held.get("objective") or 0.0))
-    return "0, to rounding" if rounding else number(held[key])
+    """What each run's reward says of its expert, and what its learner proves."""
+    columns = [{one.label: one.sentence for part in facts_in(run.certificate) for one in part} for run in named.values()]
+    labels = dict.fromkeys(label for column in columns for label in column)
+    rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
+    lead = "What each run's reward says of its expert, and what each learner proves of its program."
+    return _table("certificate", "Certificates", lead, named, rows)
 
 
 def _doctors(named: Mapping[str, Run]) -> Section:

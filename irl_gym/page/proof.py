@@ -1,16 +1,14 @@
 """The verdict, the certificate in words, and the doctor's sentences."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
+from irl_gym.certificates import facts_in
 from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
-from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -18,8 +16,6 @@ from irl_gym.sampling_error import estimated_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged, returns_of
 
-UNKNOWN = "one episode tells no noise"
-"""In place of a standard error that there is none of."""
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
 
@@ -128,8 +124,7 @@ def _sentence(run: Run, score: float | None, share: float | None, optimal: bool 
     certified = "whether the expert is optimal under it is undecided"
     if optimal is not None:
         certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
-    on_table = run.metrics["reward"].get("on_table")
-    certified += "" if run.recomputed else ", by the run's own record" + (f", and on the table: {on_table}" if on_table else "")
+    certified += "" if run.recomputed else ", by the run's own record"
     return f"{earned}{tie}; {certified}.{_counted(run)}"
 
 
@@ -145,100 +140,18 @@ def _counted(run: Run) -> str:
 
 
 def certificate(run: Run) -> Section:
-    """What the learned reward proves, line by line, and the raw numbers behind it."""
+    """What the learned reward says of the expert, what its learner proves, and the raw numbers behind both."""
     raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
-    lead = "The run's record, which it computed from the table, the expert and the reward alone, not taken from the solver."
-    if run.recomputed:
-        lead = (
-            "Whether the expert is optimal was computed again for this page, from the table, the expert and the reward in the "
-            "run's folder; the rest is the run's record, which it computed from them, not taken from the solver."
-        )
-    if run.metrics["reward"].get("loss_share") is not None:
-        lead = f"{lead} {AT_STAKE}"
+    of_reward, of_program = facts_in(run.certificate)
+    parts = [
+        {"title": f"Of the reward: {whence(run.recomputed)}", "lines": [(one.label, one.sentence) for one in of_reward]},
+        {"title": f"Of its program: {whence(False)}", "lines": [(one.label, one.sentence) for one in of_program]},
+    ]
+    lead = "What the reward says of the expert, from the table, the expert and the reward alone, and what its learner proves."
     if run.table is None:
-        lead = (
-            "The run's record, which it computed from the sampled trajectories and the reward alone, not taken from the solver."
-        )
-    shown = {"lines": list(_lines(run)), "raw": raw}
-    return Section("certificate", "Certificate", lead, (), "certificate", shown)
-
-
-def _lines(run: Run) -> Iterator[tuple[str, str]]:
-    """Terms and what they are, for whichever learner's certificate it is."""
-    reward, held = run.metrics["reward"], run.certificate
-    yield "Status of the program", str(reward.get("status", "not recorded in this version"))
-    optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
-    yield "Expert optimal under the reward", optimal
-    if "on_table" in reward:
-        yield "Judged on the table", reward["on_table"]
-    if not (run.metrics.get("table") or {}).get("exact", True):
-        yield "Judged on", estimated_table(run.metrics["table"], reward)
-    if held.get("degenerate"):
-        yield "Degenerate", "yes: the reward is zero, or ties the expert with every action, or every policy found"
-    margin = np.array([np.nan if one is None else one for one in held.get("margin", [])], dtype=float)
-    finite = margin[np.isfinite(margin)]
-    if finite.size:
-        yield "Margins", f"{number(finite.min())} to {number(finite.max())} in {counted(finite.size, 'state')}"
-    cap = held.get("margin_cap")
-    if "margin_cap" in held:
-        yield "Margin cap", "none: Ng & Russell's own program" if cap is None else number(cap)
-    gap = held.get("duality_gap")
-    objective = abs(held.get("objective") or 0.0)
-    nothing = gap is not None and gap <= ROUNDING * max(1.0, objective)
-    best = (
-        "" if gap is None else ", to rounding the best possible" if nothing else f", at most {gap:.1e} below the best possible"
-    )
-    yield "Objective", f"{number(held.get('objective'))}{best}"
-    if "lambda_0" in held:
-        top = held["lambda_0"]
-        zero = "lambda_0 was not computed" if top is None else f"from {number(top)} on the reward is 0"
-        yield "lambda and lambda_0", f"{number(held.get('l1'))}; {zero}"
-    if held.get("least_l1_norm") is not None:
-        yield "||R||_1", f"{number(held.get('l1_norm'))}; the least with these margins is {number(held['least_l1_norm'])}"
-    for key, told in _COUNTS.items():
-        n = reward.get(f"{key}_states")
-        if n:
-            yield told[0], f"{counted(n, 'state')}: {told[1]}"
-    if "distance" in held:
-        yield "Distance to the expert", (
-            f"{number(held['distance'])} in the features; {_noise(held.get('distance_error'))}"
-        )  # fmt: skip
-        yield "Planner", "fell short of the expert" if held.get("fell_short") else "as good as the expert under the reward"
-    if "n_features" in held:
-        yield "Features", f"{held['n_features']:,}; the rows have rank {held['rank']:,}"
-    if "worst_tie_regret" in reward:
-        yield "Worst tie", f"loses {sum_of(max(reward['worst_tie_regret'], 0.0))} of value against the expert"
-
-
-_COUNTS = {
-    "inseparable": ("Cannot be settled", "another action has the same successors, so no reward on states tells them apart"),
-    "marginless": ("Without a margin", "the expert is only tied with another action"),
-    "unsettled": ("Left open by the counts", "a margin of the expert is within its sampling error, and may be noise"),
-    "unbreakable": (
-        "Always tied",
-        "some action ties with the expert's under every reward of this kind that makes the expert optimal",
-    ),
-    "unknown": ("Expert not seen", "nothing is asked of its actions there"),
-    "violated": ("Violated", "another action is better there under the learned reward"),
-    "unconstrained": ("Without a comparison", "all actions do the same there"),
-}
-
-
-def _why_not(reward: Mapping[str, Any]) -> str:
-    worst = reward.get("worst_violation")
-    if worst:
-        n = reward.get("violated_states")
-        where = f" in {counted(n, 'state')}" if n else ""
-        return f"no: another action is better by up to {number(worst, 3)}{where}"
-    if "regret" in reward:
-        error = reward["regret_error"]
-        noise = f"; {UNKNOWN}" if error is None else f" +- {number(error, 2)}"
-        return f"no: the policy planned for it gains {number(reward['regret'], 3)}{noise}"
-    return "no"
-
-
-def _noise(error: float | None) -> str:
-    return UNKNOWN if error is None else f"noise alone makes about {number(error, 2)}"
+        lead = "What the learner proves, from the sampled trajectories and the reward alone. Without a table there is no more."
+    shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}
+    return Section("certificate", "Certificate", f"{lead} No solver's word is taken.", (), "certificate", shown)
 
 
 def doctor(run: Run) -> Section:

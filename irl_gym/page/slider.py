@@ -120,7 +120,7 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     sets = greedy_sets(scene, pieces.rewards)
     shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
     data = {
-        "start": _own(pieces, scene.run.certificate.get("l1")),
+        "start": _own(pieces, scene.run.certificate["proof"].get("l1")),
         "pieces": [_told(pieces, i) for i in range(len(pieces.low))],
         "figures": {panel.name: changing for panel, changing in shown},
     }

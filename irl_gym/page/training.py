@@ -183,7 +183,7 @@ def _largest_reward(run: Run) -> float:
 def _least_margin(run: Run) -> str:
     """The margin that the feasible rewards have: half the largest that all states can have at once, as FiniteLP's own cap."""
     told = "half the largest that all states can have at once"
-    cap = run.certificate.get("margin_cap")
+    cap = run.certificate["proof"].get("margin_cap")
     own = (run.config.get("learner") or {}).get("margin_cap") == "auto" and isinstance(cap, int | float)
     return f"{number(cap)}, {told}," if own else told
 

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irl_gym.ambiguity.feasible import feasible_reward, membership, sample_feasible
-from irl_gym.certificate import certify
 from irl_gym.dynamic_programming import evaluate_policy, policy_iteration
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, InvalidReward
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.optimality import certify
 
 seeds = st.integers(0, 2**32 - 1)
 

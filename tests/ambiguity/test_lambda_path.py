@@ -8,7 +8,6 @@ import pytest
 from models import Model, episodic_model, models, paper_grid, random_model, ring
 
 from irl_gym.ambiguity.lambda_path import ARRAYS, LambdaPath, lambda_path
-from irl_gym.certificate import certify
 from irl_gym.errors import (
     DegenerateExpert,
     InvalidMDP,
@@ -18,6 +17,7 @@ from irl_gym.errors import (
     SolverTimeout,
 )
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.optimality import certify
 from irl_gym.rewards import write_archive
 
 GRID = paper_grid()
@@ -32,7 +32,7 @@ def grid() -> LambdaPath:
 def objectives(model, expert, prices, cap=None, **settings):
     """FiniteLP's optimum at each price, solved afresh; at price 0 without the capped program's limit."""
     return np.array([
-        FiniteLP(l1=max(price, 1e-12), margin_cap=cap, solver="highs", **settings).fit(model.mdp, expert).objective
+        FiniteLP(l1=max(price, 1e-12), margin_cap=cap, solver="highs", **settings).fit(model.mdp, expert).proof.objective
         for price in prices
     ])  # fmt: skip
 
@@ -91,7 +91,7 @@ def test_breakpoints_are_where_no_price_between_changes_the_norm(grid):
     for low, high, norm in zip(grid.breakpoints, grid.breakpoints[1:], grid.l1_norms, strict=False):
         inside = low + 0.9 * (high - low)
         found = FiniteLP(l1=inside, margin_cap=None, solver="highs").fit(GRID.mdp, GRID.expert)
-        assert found.certificate.l1_norm == pytest.approx(norm, abs=1e-5)
+        assert found.proof.l1_norm == pytest.approx(norm, abs=1e-5)
 
 
 def test_at_takes_the_larger_norm_at_a_breakpoint_and_zero_beyond_the_last(grid):
@@ -140,7 +140,7 @@ def test_capped_path_agrees_with_capped_programs(cap):
 
 
 def test_auto_cap_is_finite_lp_s_own():
-    cap = FiniteLP(margin_cap="auto").fit(GRID.mdp, GRID.expert).certificate.margin_cap
+    cap = FiniteLP(margin_cap="auto").fit(GRID.mdp, GRID.expert).proof.margin_cap
     assert lambda_path(GRID.mdp, GRID.expert, margin_cap="auto").margin_cap == cap
 
 

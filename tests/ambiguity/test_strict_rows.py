@@ -29,7 +29,7 @@ def with_such_rows(seeds):
             found = FiniteLP().fit(mdp, expert)
         except DegenerateExpert:
             continue
-        if len(found.certificate.unbreakable_rows):
+        if len(found.proof.unbreakable_rows):
             yield mdp, expert, found
 
 
@@ -51,7 +51,7 @@ def test_a_path_is_that_of_the_rows_that_can_be_strict(cap):
         path = lambda_path(mdp, expert, margin_cap=cap)
         assert path.exact and path.lambda_0 == pytest.approx(FiniteLP(margin_cap=cap).critical_l1(mdp, expert), rel=1e-6)
         for price in (0.3 * path.lambda_0, 0.8 * path.lambda_0):
-            best = FiniteLP(margin_cap=path.margin_cap, l1=price).fit(mdp, expert).objective
+            best = FiniteLP(margin_cap=path.margin_cap, l1=price).fit(mdp, expert).proof.objective
             assert path.objective(price) == pytest.approx(best, abs=1e-6)
         count += 1
     assert count >= 2

@@ -61,7 +61,7 @@ def test_first_experiment_of_the_paper_has_one_optimum(l1):
     learned = FiniteLP(margin_cap=None, l1=l1).fit(model.mdp, model.expert)
     assert found.unique and found.width.max() <= 1e-6
     assert np.allclose(found.low, learned.reward.values, atol=1e-6)
-    assert found.objective == pytest.approx(learned.objective, abs=1e-6)
+    assert found.objective == pytest.approx(learned.proof.objective, abs=1e-6)
 
 
 def test_only_optimum_is_the_printed_figure():
@@ -118,7 +118,7 @@ def test_learned_reward_lies_on_the_face(model, options):
     found = optimal_face(model.mdp, model.expert, learner)
     slack = 1e-4  # an interior point's answer is within its gap of the optimum, not on it
     assert (found.low <= learned.reward.values + slack).all() and (learned.reward.values <= found.high + slack).all()
-    proof = learned.certificate
+    proof = learned.proof
     assert found.objective == pytest.approx(proof.l1_norm if found.sparsest else proof.objective, abs=1e-5)
 
 
@@ -126,7 +126,7 @@ def test_sparsest_program_is_that_of_the_limit():
     model = models.paper_grid()
     found = optimal_face(model.mdp, model.expert)
     assert found.sparsest and found.l1 == 0
-    assert found.objective == pytest.approx(FiniteLP().fit(model.mdp, model.expert).certificate.l1_norm, abs=1e-6)
+    assert found.objective == pytest.approx(FiniteLP().fit(model.mdp, model.expert).proof.l1_norm, abs=1e-6)
 
 
 def test_face_of_rewards_on_steps():
@@ -134,7 +134,7 @@ def test_face_of_rewards_on_steps():
     learner = FiniteLP(reward_on="state-action", margin_cap=None, l1=0.3)
     found, learned = optimal_face(model.mdp, model.expert, learner), learner.fit(model.mdp, model.expert)
     assert found.low.shape == (5, 3)
-    assert found.objective == pytest.approx(learned.objective, abs=1e-6)
+    assert found.objective == pytest.approx(learned.proof.objective, abs=1e-6)
     assert (found.low <= learned.reward.values + 1e-5).all() and (learned.reward.values <= found.high + 1e-5).all()
 
 

@@ -81,7 +81,7 @@ def test_pinned_widths_agree_with_the_paper_written_out(model, seed):
     learned = FiniteLP().fit(model.mdp, model.expert)
     states = np.random.default_rng(seed).choice(model.mdp.n_states, 2, replace=False)
     pins = {int(s): float(learned.reward.values[s]) for s in states}
-    margin = learned.certificate.margin_cap / 2
+    margin = learned.proof.margin_cap / 2
     found = feasible_widths(model.mdp, model.expert, margin=margin, pinned=pins)
     of, rows = rows_on_states(model.P, model.mdp.gamma, model.expert)
     low, high = by_scipy(of, rows, margin, found.with_margin, model.mdp.n_states, pins.items())

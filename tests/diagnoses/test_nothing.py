@@ -28,7 +28,7 @@ def test_a_price_above_lambda_0_is_all_that_is_wrong(margin_cap, solver):
 
 def test_lambda_0_is_computed_where_the_certificate_lacks_it():
     dear = FiniteLP(l1=5.0).fit(GRID.mdp, GRID.expert)
-    dear = replace(dear, certificate=replace(dear.certificate, lambda_0=None))
+    dear = replace(dear, proof=replace(dear.proof, lambda_0=None))
     assert "lambda_0 is 1.055" in finding("lambda-above-lambda-0", dear, GRID.mdp, GRID.expert).sentence
 
 

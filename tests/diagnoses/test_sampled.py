@@ -1,14 +1,16 @@
-"""What only the certificates of FeatureLP and TrajectoryLP know."""
+"""What only the proofs of FeatureLP and TrajectoryLP know."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from certified import both
 from models import paper_grid
 from patients import finding, names, sampled
 
 from irl_gym.diagnosis import doctor
 from irl_gym.learners.feature import FeatureLP
+from irl_gym.learners.feature_proof import SampledFeatureProof
 
 GRID = paper_grid()
 PLANNERS = ("SB3", "ValueIteration")
@@ -25,15 +27,14 @@ def test_one_feature_a_state_mends_features_that_cannot_express():
     assert names(enough, GRID.mdp, GRID.expert, true=GRID.R) == ()
 
 
-def test_margins_within_their_noise_are_told():
+@pytest.mark.parametrize(("error", "found"), [(10.0, ("noisy-rows",)), (1e-6, ())])
+def test_margins_within_their_noise_are_told(error, found):
     result = FeatureLP(np.eye(25), margin_cap="auto").fit(GRID.mdp, GRID.expert)
-    noisy = replace(result, certificate=replace(result.certificate, standard_error=10.0))
-    assert names(noisy, None, None) == ("noisy-rows",)
-
-
-def test_small_standard_errors_are_no_finding():
-    result = FeatureLP(np.eye(25), margin_cap="auto").fit(GRID.mdp, GRID.expert)
-    assert names(replace(result, certificate=replace(result.certificate, standard_error=1e-6)), None, None) == ()
+    rollouts = SampledFeatureProof(
+        **vars(result.proof), expert_optimal=True, worst_violation=0.0, margin=both(result, GRID.mdp, GRID.expert).margin,
+        violated=np.zeros(0, dtype=np.int64), indifferent=False, standard_error=error,
+    )  # fmt: skip
+    assert names(replace(result, proof=rollouts), None, None) == found
 
 
 def test_trajectories_in_which_nothing_is_wrong_are_healthy():

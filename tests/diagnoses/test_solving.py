@@ -28,12 +28,12 @@ def test_a_second_attempt_is_told_with_the_solver_that_answered():
 
 
 def test_a_wide_duality_gap_is_told():
-    wide = replace(RESULT, certificate=replace(RESULT.certificate, dual_bound=RESULT.objective * 2))
+    wide = replace(RESULT, proof=replace(RESULT.proof, dual_bound=RESULT.proof.objective * 2))
     assert names(wide, GRID.mdp, GRID.expert) == ("far-from-optimal",)
 
 
 def test_a_norm_that_could_be_smaller_is_told():
-    large = replace(RESULT, certificate=replace(RESULT.certificate, least_l1_norm=RESULT.certificate.l1_norm / 2))
+    large = replace(RESULT, proof=replace(RESULT.proof, least_l1_norm=RESULT.proof.l1_norm / 2))
     assert "least with these margins" in finding("far-from-optimal", large, GRID.mdp, GRID.expert).sentence
 
 
@@ -41,15 +41,15 @@ def test_a_norm_that_could_be_smaller_is_told():
 def test_a_zero_reward_of_the_paper_s_program_is_not_far_from_optimal(kind):
     model = random_model(0, kind=kind)
     dear = FiniteLP(l1=50.0, margin_cap=None).fit(model.mdp, model.expert)
-    rounding = replace(dear, certificate=replace(dear.certificate, dual_bound=1e-9))
+    rounding = replace(dear, proof=replace(dear.proof, dual_bound=1e-9))
     assert [one for one in names(rounding, model.mdp, model.expert) if one != "same-successors"] == ["lambda-above-lambda-0"]
 
 
 @pytest.mark.parametrize("share, told", [(1e-9, False), (0.5, True)])
 def test_a_gap_is_rounding_where_price_and_margins_cancel(share, told):
-    price = RESULT.certificate.l1_norm
-    near = replace(RESULT.certificate, l1=1.0, margin_cap=None, objective=0.0, dual_bound=share * price)
-    assert ("far-from-optimal" in names(replace(RESULT, certificate=near), GRID.mdp, GRID.expert)) == told
+    price = RESULT.proof.l1_norm
+    near = replace(RESULT.proof, l1=1.0, margin_cap=None, objective=0.0, dual_bound=share * price)
+    assert ("far-from-optimal" in names(replace(RESULT, proof=near), GRID.mdp, GRID.expert)) == told
 
 
 def test_the_other_solver_mends_an_answer_that_was_short():

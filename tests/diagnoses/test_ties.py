@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from certified import both
 from models import paper_grid
 from patients import finding, judged, names, partly_contradicted
 
@@ -47,7 +48,7 @@ def test_ties_that_another_reward_breaks_are_told(toy_text):
 def test_a_mend_of_ties_is_not_what_the_run_has(toy_text):
     mdp, expert, _ = lake(toy_text)
     free, best = FiniteLP(margin_cap=None).fit(mdp, expert), FiniteLP().fit(mdp, expert)
-    soft = replace(free, certificate=replace(free.certificate, slack=1.0))
+    soft = replace(free, proof=replace(free.proof, slack=1.0))
     same = replace(best, reward=free.reward)
     said = [finding("avoidable-ties", one, mdp, expert) for one in (free, soft, same)]
     assert [one.flags for one in said] == [CAPPED, ("--slack none", *CAPPED), ()]
@@ -70,7 +71,7 @@ def test_ties_that_only_other_features_break_ask_for_features():
     mdp = TabularMDP.from_dense(np.array([[B, C, D], [B, B, B], [C, C, C], [D, D, D]]), 0.9, A)
     found = FeatureLP(np.array([[0.0], [0.0], [0.0], [1.0]]), margin_cap="auto").fit(mdp, ZERO[:4])
     said = finding("avoidable-ties", found, mdp, ZERO[:4])
-    assert found.certificate.unbreakable_rows.tolist() == [[0, 1]] and found.certificate.margin[0] > 0
+    assert found.proof.unbreakable_rows.tolist() == [[0, 1]] and both(found, mdp, ZERO[:4]).margin[0] > 0
     assert (said.states.tolist(), said.actions) == ([0], (1,)) and said.flags == ("--features",)
 
 

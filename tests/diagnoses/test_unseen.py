@@ -37,7 +37,7 @@ def test_avoiding_unknown_states_mends_strays():
 
 
 def test_a_sampled_reward_that_leads_where_the_expert_never_was_is_told():
-    claims = sampled().certificate.to_json()
+    claims = sampled().proof.to_json()
     case = Case(FORK, np.zeros(4, dtype=int), TabularReward(np.array([0.0, 0.0, 1.0, 0.0])), claims)
     said = strays(case)
     assert said is not None and said.states.tolist() == [2] and "More rounds" in said.mend

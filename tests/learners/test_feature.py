@@ -7,16 +7,17 @@ import models
 import numpy as np
 import pytest
 import reference
+from certified import both, certified
 from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irl_gym.certificate import certify
 from irl_gym.features import Functions, OneHot, Table
 from irl_gym.learners import weights
 from irl_gym.learners.base import Learner, Proof
 from irl_gym.learners.feature import FeatureLP
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.optimality import certify
 from irl_gym.solvers import Status
 from irl_gym.states import StateIndex
 
@@ -35,7 +36,7 @@ def test_feature_lp_objective_equals_the_dense_lp(kind, penalty, l1):
         model, Phi, S_0 = models.with_features(seed, kind)
         expected, _ = reference.section_4_lp(model.P, 0.9, model.expert, Phi, S_0, penalty=penalty, l1=l1)
         found = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert)
-        assert found.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
+        assert found.proof.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -43,7 +44,7 @@ def test_feature_lp_of_one_hot_features_is_the_finite_lp_when_the_penalty_is_lar
     model = models.random_model(seed, kind=ALL_DIFFERENT[seed % 3])
     finite = FiniteLP(margin_cap=None, l1=0.0).fit(model.mdp, model.expert)
     large = FeatureLP(OneHot(7), penalty=1e4).fit(model.mdp, model.expert)
-    assert large.objective == pytest.approx(finite.objective, rel=1e-6)
+    assert large.proof.objective == pytest.approx(finite.proof.objective, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -55,13 +56,13 @@ def test_feature_lp_of_one_hot_features_has_the_expert_among_the_greedy_policies
         R = found.reward.values if isinstance(learner, FiniteLP) else found.reward.tabular(7).values
         Q = reference.action_values(model.P, 0.9, model.P @ R, reference.values(model.P, 0.9, model.P @ R))
         best = Q >= Q.max(axis=1, keepdims=True) - 1e-7
-        assert found.certificate.expert_optimal and best[acting, model.expert[acting]].all()
+        assert both(found, model.mdp, model.expert).expert_optimal and best[acting, model.expert[acting]].all()
 
 
 def test_feature_lp_objective_is_12_6837_on_the_grid_of_the_paper():
     grid = models.paper_grid()
     found = FeatureLP(OneHot(25), penalty=1e3).fit(grid.mdp, grid.expert)
-    assert found.objective == pytest.approx(12.6837, abs=1e-4) and found.certificate.expert_optimal
+    assert found.proof.objective == pytest.approx(12.6837, abs=1e-4) and both(found, grid.mdp, grid.expert).expert_optimal
 
 
 # --- property: what every result proves ---
@@ -70,7 +71,7 @@ def test_feature_lp_objective_is_12_6837_on_the_grid_of_the_paper():
 @given(sample=models.featured, penalty=st.sampled_from([1.0, 2.0, 50.0]), l1=st.sampled_from([0.0, 0.1, 1.0]))
 def test_feature_lp_duals_close_the_gap(sample, penalty, l1):
     model, Phi, S_0 = sample
-    certificate = FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1).fit(model.mdp, model.expert).certificate
+    certificate = certified(FeatureLP(Phi, S_0=S_0, penalty=penalty, l1=l1), model.mdp, model.expert)
     assert -1e-9 <= certificate.duality_gap < 1e-6
 
 
@@ -83,32 +84,30 @@ def test_feature_lp_keeps_the_weights_within_the_box(sample):
 @given(sample=models.featured)
 def test_feature_lp_pays_less_for_the_weights_when_l1_is_larger(sample):
     model, Phi, S_0 = sample
-    low, high = (FeatureLP(Phi, S_0=S_0, l1=l1).fit(model.mdp, model.expert).certificate for l1 in (0.01, 0.5))
+    low, high = (FeatureLP(Phi, S_0=S_0, l1=l1).fit(model.mdp, model.expert).proof for l1 in (0.01, 0.5))
     assert high.alpha_l1_norm <= low.alpha_l1_norm + 1e-7
 
 
 @given(model=models.models())
-def test_feature_lp_certificate_has_the_margins_of_the_finite_one(model):
+def test_feature_lp_has_the_margins_of_its_reward(model):
     found = FeatureLP(OneHot(model.mdp.n_states)).fit(model.mdp, model.expert)
-    expected = certify(model.mdp, model.expert, found.reward.tabular(model.mdp.n_states), l1=0.0, margin_cap=None)
+    expected = certify(model.mdp, model.expert, found.reward.tabular(model.mdp.n_states))
     judged = ~model.mdp.terminal
     least = reference.margins(model.P, model.mdp.gamma, model.expert, found.reward.alpha)
     least[np.isnan(expected.margin)] = np.nan  # where a reward on states can give no margin
-    np.testing.assert_allclose(found.certificate.margin, expected.margin, atol=1e-9)
     mixed = np.isin(np.arange(judged.size), expected.inseparable)
-    np.testing.assert_allclose(found.certificate.margin[judged & ~mixed], least[judged & ~mixed], atol=1e-9)
-    assert found.certificate.expert_optimal == expected.expert_optimal
+    np.testing.assert_allclose(expected.margin[judged & ~mixed], least[judged & ~mixed], atol=1e-9)
 
 
 @given(model=models.models())
 def test_feature_lp_makes_the_expert_optimal_when_the_true_reward_is_a_feature(model):
     found = FeatureLP(model.R[:, None], penalty=1e4).fit(model.mdp, model.expert)
-    assert found.certificate.expert_optimal and found.certificate.expressible and found.status is Status.OPTIMAL
+    assert both(found, model.mdp, model.expert).expert_optimal and found.proof.expressible and found.status is Status.OPTIMAL
 
 
 def test_feature_lp_judges_states_outside_the_sample():
     model = models.random_model(4, S=10)
-    certificate = FeatureLP(np.arange(10.0)[:, None], S_0=[2, 3]).fit(model.mdp, model.expert).certificate
+    certificate = certified(FeatureLP(np.arange(10.0)[:, None], S_0=[2, 3]), model.mdp, model.expert)
     assert certificate.states == 2 and np.isfinite(certificate.margin).sum() == 10
 
 
@@ -118,7 +117,7 @@ def test_feature_lp_judges_states_outside_the_sample():
 def test_feature_lp_reads_arrays_tables_and_functions_alike():
     model, Phi, S_0 = models.with_features(2, "dense")
     maps = (Phi, Table(Phi), Functions(lambda rows: Phi[rows], Phi.shape[1]))
-    found = [FeatureLP(phi, S_0=S_0).fit(model.mdp, model.expert).objective for phi in maps]
+    found = [FeatureLP(phi, S_0=S_0).fit(model.mdp, model.expert).proof.objective for phi in maps]
     assert found == pytest.approx([found[0]] * 3, abs=1e-12)
 
 
@@ -126,8 +125,8 @@ def test_feature_lp_asks_for_features_of_observations_when_states_are_given():
     model, Phi, _ = models.with_features(2, "dense")
     states = StateIndex(spaces.MultiDiscrete([2, 4]))
     of_pairs = Functions(lambda pairs: Phi[4 * pairs[:, 0] + pairs[:, 1]], Phi.shape[1])
-    expected = FeatureLP(Phi).fit(model.mdp, model.expert).objective
-    assert FeatureLP(of_pairs).fit(model.mdp, model.expert, states=states).objective == pytest.approx(expected, abs=1e-12)
+    expected = FeatureLP(Phi).fit(model.mdp, model.expert).proof.objective
+    assert FeatureLP(of_pairs).fit(model.mdp, model.expert, states=states).proof.objective == pytest.approx(expected, abs=1e-12)
 
 
 # --- what the features cannot say ---
@@ -137,7 +136,7 @@ def test_feature_lp_asks_for_features_of_observations_when_states_are_given():
 def test_feature_lp_says_inexpressible_when_the_features_are_constant(value):
     model = models.random_model(0)
     found = FeatureLP(np.full((7, 1), value)).fit(model.mdp, model.expert)
-    assert found.status is Status.INEXPRESSIBLE and not found.certificate.expressible
+    assert found.status is Status.INEXPRESSIBLE and not found.proof.expressible
 
 
 def test_feature_lp_says_inexpressible_when_no_sign_of_the_feature_will_do():
@@ -152,7 +151,7 @@ def test_feature_lp_says_inexpressible_when_no_sign_of_the_feature_will_do():
 def test_feature_lp_says_zero_weights_when_l1_is_too_high():
     model = models.random_model(0)
     found = FeatureLP(OneHot(7), l1=1e3).fit(model.mdp, model.expert)
-    assert found.status is Status.ZERO_WEIGHTS and found.certificate.zero and found.certificate.degenerate
+    assert found.status is Status.ZERO_WEIGHTS and found.proof.zero and both(found, model.mdp, model.expert).degenerate
 
 
 # --- kinds of expert ---
@@ -161,7 +160,7 @@ def test_feature_lp_says_zero_weights_when_l1_is_too_high():
 def test_feature_lp_reads_actions_distribution_and_set_alike():
     model = models.random_model(0, kind="walls")
     one_hot = np.eye(3)[model.expert]
-    found = [FeatureLP(OneHot(7)).fit(model.mdp, expert).objective for expert in (model.expert, one_hot, one_hot > 0)]
+    found = [FeatureLP(OneHot(7)).fit(model.mdp, expert).proof.objective for expert in (model.expert, one_hot, one_hot > 0)]
     assert found == pytest.approx([found[0]] * 3)
 
 
@@ -169,7 +168,7 @@ def test_feature_lp_ties_the_actions_of_a_set():
     grid = models.paper_grid()
     Q = reference.action_values(grid.P, 0.9, grid.step_reward, reference.values(grid.P, 0.9, grid.step_reward))
     optimal = Q >= Q.max(axis=1, keepdims=True) - 1e-9
-    certificate = FeatureLP(OneHot(25), penalty=1e3).fit(grid.mdp, optimal).certificate
+    certificate = certified(FeatureLP(OneHot(25), penalty=1e3), grid.mdp, optimal)
     assert certificate.expert_optimal and -1e-6 < certificate.duality_gap < 1e-6
 
 
@@ -183,21 +182,21 @@ def result():
 
 
 def test_feature_lp_is_a_learner_with_a_proof(result):
-    assert isinstance(FeatureLP(OneHot(7)), Learner) and isinstance(result.certificate, Proof)
+    assert isinstance(FeatureLP(OneHot(7)), Learner) and isinstance(result.proof, Proof)
 
 
 def test_feature_lp_result_survives_pickle(result):
     again = pickle.loads(pickle.dumps(result))
-    assert again.certificate.to_json() == result.certificate.to_json() and again.status is result.status
+    assert again.proof.to_json() == result.proof.to_json() and again.status is result.status
 
 
-def test_feature_lp_certificate_is_json(result):
-    assert json.loads(json.dumps(result.certificate.to_json()))["objective"] == result.objective
+def test_feature_lp_proof_is_json(result):
+    assert json.loads(json.dumps(result.proof.to_json()))["objective"] == result.proof.objective
 
 
-def test_feature_lp_certificate_reads_as_a_page(result):
-    text = str(result.certificate)
-    assert "expert optimal under R   yes" in text and "rank" in text
+def test_feature_lp_proof_reads_as_a_page(result):
+    text = str(result.proof)
+    assert "objective of the program   " in text and "the rows have rank" in text
 
 
 def test_feature_lp_notes_the_scaling_of_its_features(result):
@@ -210,6 +209,6 @@ def test_feature_lp_stats_name_the_program(result):
 
 def test_feature_lp_reaches_the_same_objective_by_generated_kinks(monkeypatch):
     model, Phi, _ = models.with_features(2, "sparse")
-    whole = FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective
+    whole = FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).proof.objective
     monkeypatch.setattr(weights, "SAMPLE", 2)
-    assert FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).objective == pytest.approx(whole, abs=1e-7)
+    assert FeatureLP(Phi, l1=0.1).fit(model.mdp, model.expert).proof.objective == pytest.approx(whole, abs=1e-7)

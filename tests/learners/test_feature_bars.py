@@ -29,7 +29,7 @@ expert = np.where(row >= side - 1 - column, 0, 1)  # up or right, whichever is f
 phi = RadialBasis.grid([0, 0], [side - 1, side - 1], K, coordinates=Unravel((side, side)))
 started = time.process_time()
 result = FeatureLP(phi, S_0=S_0).fit(mdp, expert)
-certificate = result.certificate
+certificate = result.proof
 print(json.dumps({
     "yards": (time.process_time() - started) / yard(),
     "bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,

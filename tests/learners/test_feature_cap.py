@@ -4,6 +4,7 @@ import models
 import numpy as np
 import pytest
 import reference
+from certified import certified
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -45,19 +46,19 @@ def test_capped_objective_equals_the_dense_lp(kind, cap, penalty, l1):
         settings = {"penalty": penalty, "l1": l1}
         expected, _ = reference.section_4_lp(model.P, 0.9, model.expert, Phi, S_0, cap=cap, **settings)
         found = FeatureLP(Phi, S_0=S_0, margin_cap=cap, **settings).fit(model.mdp, model.expert)
-        assert found.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
+        assert found.proof.objective == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
 def test_a_cap_above_all_margins_changes_nothing():
     model, Phi, S_0 = drawn(2, "dense")
     plain, capped = (FeatureLP(Phi, S_0=S_0, margin_cap=cap).fit(model.mdp, model.expert) for cap in (None, 1e4))
-    assert capped.objective == pytest.approx(plain.objective)
+    assert capped.proof.objective == pytest.approx(plain.proof.objective)
 
 
 @given(sample=samples, cap=st.sampled_from([0.01, 0.3, 5.0]))
 def test_capped_duals_close_the_gap(sample, cap):
     model, Phi, S_0 = sample
-    certificate = FeatureLP(Phi, S_0=S_0, margin_cap=cap).fit(model.mdp, model.expert).certificate
+    certificate = certified(FeatureLP(Phi, S_0=S_0, margin_cap=cap), model.mdp, model.expert)
     assert certificate.margin_cap == cap and -1e-9 <= certificate.duality_gap < 1e-6
 
 
@@ -76,9 +77,9 @@ def test_the_bound_is_above_every_objective_whatever_the_duals(seed, cap, slope)
 @pytest.mark.parametrize("cap", [0.01, 0.3])
 def test_the_capped_objective_is_the_same_by_generated_kinks(cap, monkeypatch):
     model, Phi, _ = drawn(2, "sparse")
-    whole = FeatureLP(Phi, margin_cap=cap).fit(model.mdp, model.expert).objective
+    whole = FeatureLP(Phi, margin_cap=cap).fit(model.mdp, model.expert).proof.objective
     monkeypatch.setattr(weights, "SAMPLE", 2)
-    assert FeatureLP(Phi, margin_cap=cap).fit(model.mdp, model.expert).objective == pytest.approx(whole, abs=1e-7)
+    assert FeatureLP(Phi, margin_cap=cap).fit(model.mdp, model.expert).proof.objective == pytest.approx(whole, abs=1e-7)
 
 
 # --- the cap that it chooses ---
@@ -91,7 +92,7 @@ def test_the_automatic_cap_is_half_of_the_uniform_margin(seed, kind):
     model = models.random_model(seed, S=8, kind=kind)
     found = FeatureLP(OneHot(8), margin_cap="auto").fit(model.mdp, model.expert)
     most = uniform(model, np.eye(8), range(8))
-    assert most > 1e-6 and found.certificate.margin_cap == pytest.approx(most / 2, rel=1e-5)
+    assert most > 1e-6 and found.proof.margin_cap == pytest.approx(most / 2, rel=1e-5)
 
 
 @pytest.mark.parametrize(("seed", "kind"), WITH_MARGIN)
@@ -99,7 +100,7 @@ def test_the_automatic_cap_makes_the_expert_strictly_optimal_in_the_sample(seed,
     model, _, S_0 = drawn(seed, kind)
     found = FeatureLP(OneHot(8), S_0=S_0, margin_cap="auto").fit(model.mdp, model.expert)
     margins = reference.margins(model.P, 0.9, model.expert, found.reward.alpha, skip_equal=True)[S_0]
-    assert margins.min() >= found.certificate.margin_cap * (1 - 1e-6) > 0
+    assert margins.min() >= found.proof.margin_cap * (1 - 1e-6) > 0
 
 
 @given(sample=samples)
@@ -121,7 +122,7 @@ def without_margin():
     """A model, and two features that leave no reward under which the expert is strictly best everywhere."""
     for seed in range(50):
         model, Phi, _ = drawn(seed, "dense", K=2)
-        if uniform(model, Phi, range(8)) < 1e-9 and FeatureLP(Phi).fit(model.mdp, model.expert).objective > 0.1:
+        if uniform(model, Phi, range(8)) < 1e-9 and FeatureLP(Phi).fit(model.mdp, model.expert).proof.objective > 0.1:
             return model, Phi
     raise AssertionError("none of 50 models will do")
 
@@ -131,27 +132,27 @@ def test_the_automatic_cap_is_a_tenth_of_the_mean_margin_when_there_is_no_unifor
     plain = FeatureLP(Phi).fit(model.mdp, model.expert)
     margins = reference.margins(model.P, 0.9, model.expert, Phi @ plain.reward.alpha)
     found = FeatureLP(Phi, margin_cap="auto").fit(model.mdp, model.expert)
-    assert found.certificate.margin_cap == pytest.approx(np.maximum(margins, 0).mean() / 10, rel=1e-6)
+    assert found.proof.margin_cap == pytest.approx(np.maximum(margins, 0).mean() / 10, rel=1e-6)
 
 
 @pytest.mark.parametrize("value", [0.0, 3.0])
 def test_there_is_no_automatic_cap_when_nothing_has_a_margin(value):
     model = models.random_model(0)
-    assert FeatureLP(np.full((7, 1), value), margin_cap="auto").fit(model.mdp, model.expert).certificate.margin_cap is None
+    assert FeatureLP(np.full((7, 1), value), margin_cap="auto").fit(model.mdp, model.expert).proof.margin_cap is None
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_the_automatic_cap_does_not_depend_on_the_scale_of_the_features(scale):
     model, Phi, _ = drawn(1, "dense", K=9)
-    plain, scaled = (FeatureLP(f * Phi, margin_cap="auto").fit(model.mdp, model.expert).certificate for f in (1.0, scale))
+    plain, scaled = (FeatureLP(f * Phi, margin_cap="auto").fit(model.mdp, model.expert).proof for f in (1.0, scale))
     assert scaled.margin_cap == pytest.approx(scale * plain.margin_cap, rel=1e-5)
 
 
 def test_the_automatic_cap_counts_the_ties_of_a_set_of_actions():
     grid = models.paper_grid()
     Q = reference.action_values(grid.P, 0.9, grid.step_reward, reference.values(grid.P, 0.9, grid.step_reward))
-    found = FeatureLP(OneHot(25), margin_cap="auto", penalty=1e3).fit(grid.mdp, Q >= Q.max(axis=1, keepdims=True) - 1e-9)
-    assert found.certificate.expert_optimal
+    expert = Q >= Q.max(axis=1, keepdims=True) - 1e-9
+    assert certified(FeatureLP(OneHot(25), margin_cap="auto", penalty=1e3), grid.mdp, expert).expert_optimal
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, float("nan"), float("inf"), "none", True])

@@ -27,9 +27,9 @@ def test_program_as_printed_equals_the_dense_lp_and_the_default_departs(l1):
         printed, _ = reference.section_4_lp(P, 0.9, expert, Phi, range(8), l1=l1, printed=True)
         departs, _ = reference.section_4_lp(P, 0.9, expert, Phi, range(8), l1=l1)
         found = FeatureLP(Phi, l1=l1, trivial_rows="as printed").fit(mdp, expert)
-        assert found.objective == pytest.approx(printed, rel=1e-7, abs=1e-7)
-        assert found.certificate.duality_gap <= 1e-6
-        assert FeatureLP(Phi, l1=l1).fit(mdp, expert).objective == pytest.approx(departs, rel=1e-7, abs=1e-7)
+        assert found.proof.objective == pytest.approx(printed, rel=1e-7, abs=1e-7)
+        assert found.proof.duality_gap <= 1e-6
+        assert FeatureLP(Phi, l1=l1).fit(mdp, expert).proof.objective == pytest.approx(departs, rel=1e-7, abs=1e-7)
         differ += departs > printed + 1e-6
     assert differ
 

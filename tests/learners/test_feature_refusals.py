@@ -209,7 +209,7 @@ def driven(drive):
 
 
 def test_feature_lp_on_a_model_makes_the_expert_optimal_within_the_noise(driven):
-    assert driven.status is Status.OPTIMAL and driven.certificate.worst_violation <= 3 * driven.certificate.standard_error
+    assert driven.status is Status.OPTIMAL and driven.proof.worst_violation <= 3 * driven.proof.standard_error
 
 
 def test_feature_lp_on_a_model_pays_most_in_the_corner_that_the_expert_seeks(driven):
@@ -218,11 +218,11 @@ def test_feature_lp_on_a_model_pays_most_in_the_corner_that_the_expert_seeks(dri
 
 
 def test_feature_lp_on_a_model_closes_the_gap(driven):
-    assert -1e-6 < driven.certificate.duality_gap < 1e-6
+    assert -1e-6 < driven.proof.duality_gap < 1e-6
 
 
 def test_feature_lp_on_a_model_judges_the_sample(driven):
-    assert driven.certificate.margin.shape == (40,) and driven.certificate.states + driven.certificate.trivial == 40
+    assert driven.proof.margin.shape == (40,) and driven.proof.states + driven.proof.trivial == 40
 
 
 def test_feature_lp_on_a_model_says_where_it_was_cut(driven):
@@ -231,7 +231,7 @@ def test_feature_lp_on_a_model_says_where_it_was_cut(driven):
 
 
 def test_feature_lp_on_a_model_has_no_standard_error_of_one_rollout(drive):
-    assert FeatureLP(PHI, S_0=5, horizon=3).fit(drive, Upwards()).certificate.standard_error is None
+    assert FeatureLP(PHI, S_0=5, horizon=3).fit(drive, Upwards()).proof.standard_error is None
 
 
 def test_feature_lp_on_a_model_repeats_itself(drive):

@@ -3,6 +3,7 @@
 import models
 import numpy as np
 import pytest
+from certified import certified
 from hypothesis import given
 
 from irl_gym.errors import DegenerateExpert, InvalidPolicy
@@ -48,13 +49,13 @@ def test_feature_lp_repeats_itself_with_a_number_of_states():
     model = models.random_model(1, S=30)
     once, again = (FeatureLP(OneHot(30), S_0=5, seed=2).fit(model.mdp, model.expert) for _ in range(2))
     np.testing.assert_array_equal(once.reward.alpha, again.reward.alpha)
-    assert once.certificate.states == 5
+    assert once.proof.states == 5
 
 
 def test_feature_lp_counts_a_state_once_when_it_is_given_twice():
     model = models.random_model(1)
     one, two = (FeatureLP(OneHot(7), S_0=S_0).fit(model.mdp, model.expert) for S_0 in ([1, 4], [4, 1, 4]))
-    assert two.objective == one.objective and two.certificate.states == 2
+    assert two.proof.objective == one.proof.objective and two.proof.states == 2
 
 
 # --- the rows ---
@@ -67,7 +68,7 @@ def test_feature_lp_counts_the_rank_of_the_rows(sample):
     P_pi = model.P[np.arange(8), model.expert]
     V = np.linalg.inv(np.eye(8) - 0.9 * P_pi) @ mixed
     d = ((P_pi[S_0, None] - model.P[S_0]) @ V).reshape(-1, mixed.shape[1])
-    certificate = FeatureLP(mixed, S_0=S_0).fit(model.mdp, model.expert).certificate
+    certificate = certified(FeatureLP(mixed, S_0=S_0), model.mdp, model.expert)
     assert (certificate.rank, certificate.n_features) == (np.linalg.matrix_rank(d, tol=1e-9), mixed.shape[1])
 
 
@@ -76,7 +77,7 @@ def test_feature_lp_counts_states_with_and_without_a_row(sample):
     model, Phi, S_0 = sample
     P_pi = model.P[np.arange(8), model.expert]
     moving = np.abs(P_pi[:, None] - model.P).max(axis=(1, 2)) > 1e-12
-    certificate = FeatureLP(Phi, S_0=S_0).fit(model.mdp, model.expert).certificate
+    certificate = certified(FeatureLP(Phi, S_0=S_0), model.mdp, model.expert)
     assert (certificate.states, certificate.trivial) == (moving[S_0].sum(), (~moving[S_0]).sum())
 
 
@@ -101,20 +102,20 @@ def partly_known(model, unknown):
 
 def test_rows_are_only_of_states_in_which_the_expert_is_known():
     model = models.random_model(1, S=10)
-    certificate = FeatureLP(OneHot(10)).fit(model.mdp, partly_known(model, [2, 5])).certificate
+    certificate = certified(FeatureLP(OneHot(10)), model.mdp, partly_known(model, [2, 5]))
     assert certificate.states == 8 and np.flatnonzero(np.isnan(certificate.margin)).tolist() == [2, 5]
 
 
 @pytest.mark.parametrize("S_0", [6, [2, 3, 4]])
 def test_sample_leaves_out_states_in_which_the_expert_is_unknown(S_0):
     model = models.random_model(1, S=10)
-    certificate = FeatureLP(OneHot(10), S_0=S_0).fit(model.mdp, partly_known(model, [2, 5, 7, 8])).certificate
+    certificate = certified(FeatureLP(OneHot(10), S_0=S_0), model.mdp, partly_known(model, [2, 5, 7, 8]))
     assert certificate.states == (6 if S_0 == 6 else 2)
 
 
 def test_expert_that_is_known_everywhere_gives_the_same_rows_as_actions():
     model = models.random_model(1, S=10)
-    found = [FeatureLP(OneHot(10)).fit(model.mdp, expert).objective for expert in (model.expert, partly_known(model, []))]
+    found = [FeatureLP(OneHot(10)).fit(model.mdp, expert).proof.objective for expert in (model.expert, partly_known(model, []))]
     assert found[0] == pytest.approx(found[1])
 
 

@@ -3,6 +3,7 @@
 import models
 import numpy as np
 import pytest
+from certified import certified
 from scipy.optimize import linprog
 
 from irl_gym.comparisons import compare
@@ -53,7 +54,7 @@ def check(seeds, cap):
         if not can.any():
             continue  # nothing to compare, or inexpressible
         found = FeatureLP(Phi, S_0=S_0, margin_cap=cap).fit(mdp, expert)
-        certificate, margins = found.certificate, d @ found.reward.alpha
+        certificate, margins = found.proof, d @ found.reward.alpha
         assert certificate.unbreakable_rows.tolist() == np.stack([states, actions], axis=1)[~can].tolist(), seed
         assert (margins[can] >= certificate.margin_cap * (1 - 1e-6)).all() and margins.min() > -1e-7, seed
         assert certificate.expressible and -1e-9 <= certificate.duality_gap < 1e-6, seed
@@ -85,23 +86,22 @@ def test_rows_are_left_out_one_by_one_on_many_tables(cap):
 
 @pytest.mark.parametrize("cap", ["auto", 0.5])
 def test_falling_has_a_margin_where_staying_can_have_none(cap):
-    found = FeatureLP(OneHot(3), margin_cap=cap).fit(swapping(), np.zeros(3, dtype=int))
-    certificate = found.certificate
+    certificate = certified(FeatureLP(OneHot(3), margin_cap=cap), swapping(), np.zeros(3, dtype=int))
     assert certificate.unbreakable_rows.tolist() == [[0, 1], [1, 1]] and certificate.unbreakable.tolist() == [0, 1]
     assert certificate.margin[:2] == pytest.approx([certificate.margin_cap] * 2, rel=1e-6) and certificate.expert_optimal
-    assert "2 rows of (10), in 2 states" in str(certificate)
+    assert "always tied" in certificate.told and "2 actions in 2 states: no reward in the span" in certificate.told
 
 
 def test_the_program_of_the_paper_leaves_no_row_out():
-    certificate = FeatureLP(OneHot(3)).fit(swapping(), np.zeros(3, dtype=int)).certificate
+    certificate = certified(FeatureLP(OneHot(3)), swapping(), np.zeros(3, dtype=int))
     assert certificate.unbreakable_rows.shape == (0, 2) and certificate.margin[:2] == pytest.approx([0, 0], abs=1e-9)
 
 
 def test_what_other_features_break_is_left_out_of_these_only():
     mdp, expert = swapping(), np.zeros(3, dtype=int)
     blind = np.array([[1.0], [1.0], [1.0]])  # of nothing that differs
-    assert not FeatureLP(blind, margin_cap="auto").fit(mdp, expert).certificate.expressible
-    fallen = FeatureLP(np.array([[0.0], [0.0], [1.0]]), margin_cap="auto").fit(mdp, expert).certificate
+    assert not FeatureLP(blind, margin_cap="auto").fit(mdp, expert).proof.expressible
+    fallen = certified(FeatureLP(np.array([[0.0], [0.0], [1.0]]), margin_cap="auto"), mdp, expert)
     assert fallen.unbreakable_rows.tolist() == [[0, 1], [1, 1]] and fallen.margin[0] > 0
 
 
@@ -110,6 +110,6 @@ def test_an_expert_of_several_actions_gains_a_margin_over_the_others():
     rows = np.full((25, 4), False)
     rows[np.arange(25), grid.expert] = True
     rows[0, :] = [True, True, False, False] if not rows[0, 2:].any() else [False, False, True, True]
-    found = FeatureLP(OneHot(25), margin_cap=0.01).fit(grid.mdp, rows)
-    finite = found.certificate.margin[np.isfinite(found.certificate.margin)]
-    assert found.certificate.expert_optimal and (finite > -1e-9).all() and (finite >= 0.01 * (1 - 1e-6)).mean() > 0.5
+    found = certified(FeatureLP(OneHot(25), margin_cap=0.01), grid.mdp, rows)
+    finite = found.margin[np.isfinite(found.margin)]
+    assert found.expert_optimal and (finite > -1e-9).all() and (finite >= 0.01 * (1 - 1e-6)).mean() > 0.5

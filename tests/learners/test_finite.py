@@ -4,11 +4,12 @@ import models
 import numpy as np
 import pytest
 import reference
+from certified import certified
 from hypothesis import given
 
-from irl_gym.certificate import certify
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import certify
 from irl_gym.solvers import Status
 
 PAPER = FiniteLP(margin_cap=None)
@@ -50,7 +51,7 @@ def test_finite_lp_gives_figure_2_of_the_paper(grid):
 
 
 def test_finite_lp_objective_is_12_6837_in_figure_2(grid):
-    assert PAPER.fit(grid.mdp, grid.expert).objective == pytest.approx(12.6837, abs=1e-4)
+    assert PAPER.fit(grid.mdp, grid.expert).proof.objective == pytest.approx(12.6837, abs=1e-4)
 
 
 def test_critical_l1_is_1_0550_in_the_paper(grid):
@@ -64,7 +65,7 @@ def test_finite_lp_says_zero_when_l1_is_above_lambda_0(grid):
 
 def test_finite_lp_is_not_zero_when_l1_is_auto(grid):
     result = FiniteLP(margin_cap=None, l1="auto").fit(grid.mdp, grid.expert)
-    assert result.status is Status.OPTIMAL and result.objective > 0
+    assert result.status is Status.OPTIMAL and result.proof.objective > 0
 
 
 @pytest.mark.parametrize("kind", models.KINDS)
@@ -73,7 +74,7 @@ def test_finite_lp_objective_equals_the_dense_lp(kind, l1):
     for seed in range(20):
         model = models.random_model(seed, kind=kind)
         expected, _ = reference.paper_lp(model.P, 0.9, model.expert, l1=l1)
-        assert FiniteLP(margin_cap=None, l1=l1).fit(model.mdp, model.expert).objective == pytest.approx(
+        assert FiniteLP(margin_cap=None, l1=l1).fit(model.mdp, model.expert).proof.objective == pytest.approx(
             expected, rel=1e-6, abs=1e-9
         )
 
@@ -91,13 +92,13 @@ def test_critical_l1_equals_bisection_on_the_dense_lp(kind):
 @every_mode
 @given(model=models.models())
 def test_finite_lp_makes_the_expert_optimal(learner, model):
-    assert learner.fit(model.mdp, model.expert).certificate.expert_optimal
+    assert certified(learner, model.mdp, model.expert).expert_optimal
 
 
 @pytest.mark.parametrize("mode", ["paper", "paper, l1 auto", "capped, l1", "auto, l1", "steps, l1"])
 @given(model=models.models())
 def test_finite_lp_duals_close_the_gap(mode, model):
-    certificate = MODES[mode].fit(model.mdp, model.expert).certificate
+    certificate = certified(MODES[mode], model.mdp, model.expert)
     scale = 1 / (1 - model.mdp.gamma)
     assert -1e-7 * scale <= certificate.duality_gap <= 1e-5 * scale
 
@@ -110,7 +111,7 @@ def test_finite_lp_keeps_the_bound_on_the_reward(mode, model):
 
 @given(model=models.models())
 def test_finite_lp_gives_each_state_the_cap_that_the_true_reward_separates(model):
-    certificate = FiniteLP().fit(model.mdp, model.expert).certificate
+    certificate = certified(FiniteLP(), model.mdp, model.expert)
     true_margins = reference.margins(model.P, model.mdp.gamma, model.expert, model.R, skip_equal=True)
     attainable = (true_margins > 1e-6) & np.isfinite(true_margins)
     assert (certificate.margin[attainable] >= certificate.margin_cap * (1 - 1e-6)).all()
@@ -118,22 +119,22 @@ def test_finite_lp_gives_each_state_the_cap_that_the_true_reward_separates(model
 
 @given(model=models.models())
 def test_finite_lp_on_steps_leaves_no_state_without_a_margin(model):
-    certificate = FiniteLP(reward_on="state-action").fit(model.mdp, model.expert).certificate
+    certificate = certified(FiniteLP(reward_on="state-action"), model.mdp, model.expert)
     assert (certificate.margin[~model.mdp.terminal] >= certificate.margin_cap * (1 - 1e-6)).all()
 
 
 @given(model=models.models())
 def test_finite_lp_auto_is_the_limit_of_the_capped_lp(model):
     auto = FiniteLP().fit(model.mdp, model.expert)
-    cap, l1 = auto.certificate.margin_cap, 0.5 * auto.stats["l1_limit"]
+    cap, l1 = auto.proof.margin_cap, 0.5 * auto.stats["l1_limit"]
     limit = certify(model.mdp, model.expert, auto.reward, l1=l1, margin_cap=cap)
     capped = FiniteLP(margin_cap=cap, l1=l1).fit(model.mdp, model.expert)
-    assert limit.objective == pytest.approx(capped.objective, rel=1e-5)
+    assert limit.proof.objective == pytest.approx(capped.proof.objective, rel=1e-5)
 
 
 @given(model=models.models())
 def test_finite_lp_scales_with_r_max(model):
-    one, three = (FiniteLP(r_max=r, margin_cap=None).fit(model.mdp, model.expert).objective for r in (1.0, 3.0))
+    one, three = (FiniteLP(r_max=r, margin_cap=None).fit(model.mdp, model.expert).proof.objective for r in (1.0, 3.0))
     assert three == pytest.approx(3 * one, rel=1e-6)
 
 
@@ -152,7 +153,7 @@ def test_finite_lp_pays_less_for_the_reward_when_l1_is_larger(model):
 def test_finite_lp_reads_actions_distribution_and_set_alike(learner):
     model = models.random_model(0, kind="walls")
     one_hot = np.eye(3)[model.expert]
-    found = [learner.fit(model.mdp, expert).objective for expert in (model.expert, one_hot, one_hot > 0)]
+    found = [learner.fit(model.mdp, expert).proof.objective for expert in (model.expert, one_hot, one_hot > 0)]
     assert found == pytest.approx([found[0]] * 3)
 
 
@@ -197,8 +198,8 @@ def test_finite_lp_does_not_depend_on_states_that_no_episode_reaches():
     P = np.zeros((8, 3, 8))
     P[:6, :, :6], P[6:, :, 0] = model.P, 1
     mdp = TabularMDP.from_dense(P, 0.9, np.eye(8)[0])
-    with_more = PAPER.fit(mdp, np.append(model.expert, [0, 0])).objective
-    assert with_more == pytest.approx(PAPER.fit(model.mdp, model.expert).objective)
+    with_more = PAPER.fit(mdp, np.append(model.expert, [0, 0])).proof.objective
+    assert with_more == pytest.approx(PAPER.fit(model.mdp, model.expert).proof.objective)
 
 
 def test_finite_lp_on_steps_pays_nothing_in_terminal_states():
@@ -211,7 +212,7 @@ def test_finite_lp_result_survives_pickle():
     model = models.random_model(0)
     result = FiniteLP().fit(model.mdp, model.expert)
     again = pickle.loads(pickle.dumps(result))
-    assert again.certificate.to_json() == result.certificate.to_json() and again.status is result.status
+    assert again.proof.to_json() == result.proof.to_json() and again.status is result.status
 
 
 def test_finite_lp_stats_name_each_program():
@@ -221,10 +222,10 @@ def test_finite_lp_stats_name_each_program():
 
 
 def test_finite_lp_leaves_walls_out_when_margins_are_capped():
-    certificate = FiniteLP().fit(models.ring([[1, 1, 0], [1, 1, 0]]), np.array([0, 0])).certificate
+    certificate = certified(FiniteLP(), models.ring([[1, 1, 0], [1, 1, 0]]), np.array([0, 0]))
     assert (certificate.margin >= certificate.margin_cap * (1 - 1e-6)).all()
 
 
 def test_finite_lp_explains_a_degenerate_expert_by_a_reward_on_steps():
-    certificate = FiniteLP(reward_on="state-action").fit(models.ring([[1, 0], [0, 1]]), np.array([0, 0])).certificate
+    certificate = certified(FiniteLP(reward_on="state-action"), models.ring([[1, 0], [0, 1]]), np.array([0, 0]))
     assert (certificate.margin > 0).all()

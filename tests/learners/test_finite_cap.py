@@ -3,6 +3,7 @@
 import models
 import numpy as np
 import pytest
+from certified import both, certified
 from hypothesis import given
 
 from irl_gym.errors import DegenerateExpert, InvalidMDP, InvalidParameter
@@ -20,7 +21,7 @@ def almost_the_same(delta, gamma=0.9):
 @pytest.mark.parametrize("delta", [1e-2, 1e-5])
 def test_the_cap_is_half_of_a_small_uniform_margin(delta):
     found = FiniteLP().fit(almost_the_same(delta), np.array([0, 0, 0]))
-    assert found.certificate.margin_cap == pytest.approx(delta, rel=1e-4)  # R(1) = 1, R(2) = -1: a margin of 2 delta
+    assert found.proof.margin_cap == pytest.approx(delta, rel=1e-4)  # R(1) = 1, R(2) = -1: a margin of 2 delta
 
 
 @pytest.mark.parametrize("delta", [2e-7, 1e-8])
@@ -35,11 +36,13 @@ def test_states_that_cannot_have_a_margin_are_left_out_and_counted():
     P[0] = [[0, 0.5, 0.5, 0], [0, 1, 0, 0], [0, 0, 1, 0]]
     P[1] = [[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     P[2] = [[0, 0, 0, 1]] * 3
-    found = FiniteLP().fit(TabularMDP.from_dense(P, 0.9, [1.0, 0, 0, 0]), np.zeros(4, dtype=int))
-    assert found.stats["rows_without_margin"] == 2
-    assert found.certificate.margin[1] >= found.certificate.margin_cap * (1 - 1e-6)
-    assert found.certificate.unbreakable_rows.tolist() == [[0, 1], [0, 2]]
-    assert found.certificate.unbreakable.tolist() == [0] and found.certificate.marginless.size == 0
+    mdp, expert = TabularMDP.from_dense(P, 0.9, [1.0, 0, 0, 0]), np.zeros(4, dtype=int)
+    result = FiniteLP().fit(mdp, expert)
+    found = both(result, mdp, expert)
+    assert result.stats["rows_without_margin"] == 2
+    assert found.margin[1] >= found.margin_cap * (1 - 1e-6)
+    assert found.unbreakable_rows.tolist() == [[0, 1], [0, 2]]
+    assert found.unbreakable.tolist() == [0] and found.marginless.size == 0
 
 
 @given(model=models.models())
@@ -48,16 +51,16 @@ def test_the_sparsest_reward_is_optimal_for_every_l1_below_the_limit(model):
     l1 = 0.99 * sparsest.stats["l1_limit"]
     if l1 > 1e6:
         return  # a reward of norm 0 is free at any price
-    cap = sparsest.certificate.margin_cap
-    best = FiniteLP(margin_cap=cap, l1=l1).fit(model.mdp, model.expert).objective
-    counted = np.isfinite(sparsest.certificate.margin)
-    margins = np.minimum(sparsest.certificate.margin[counted], cap)
-    assert margins.sum() - l1 * sparsest.certificate.l1_norm == pytest.approx(best, abs=1e-6 * max(1, abs(best)))
+    cap = sparsest.proof.margin_cap
+    best = FiniteLP(margin_cap=cap, l1=l1).fit(model.mdp, model.expert).proof.objective
+    margin = both(sparsest, model.mdp, model.expert).margin
+    margins = np.minimum(margin[np.isfinite(margin)], cap)
+    assert margins.sum() - l1 * sparsest.proof.l1_norm == pytest.approx(best, abs=1e-6 * max(1, abs(best)))
 
 
 @given(model=models.models())
 def test_the_norm_of_the_sparsest_reward_is_certified(model):
-    found = FiniteLP().fit(model.mdp, model.expert).certificate
+    found = certified(FiniteLP(), model.mdp, model.expert)
     assert found.least_l1_norm <= found.l1_norm + 1e-9
     assert found.least_l1_norm == pytest.approx(found.l1_norm, rel=1e-5, abs=1e-7)
 
@@ -88,5 +91,6 @@ def test_the_expert_is_optimal_whatever_the_scale_and_the_discount(solver, r_max
         if "margin_cap" in settings:
             settings = {**settings, "reward_on": "state-action"}
         found = FiniteLP(r_max=r_max, solver=solver, **settings).fit(model.mdp, model.expert)
-        assert found.certificate.expert_optimal, found.certificate.worst_violation / r_max
+        told = both(found, model.mdp, model.expert)
+        assert told.expert_optimal, told.worst_violation / r_max
         assert np.abs(found.reward.values).max() <= r_max * (1 + 1e-12)

@@ -5,11 +5,13 @@ import json
 import models
 import numpy as np
 import pytest
+from certified import both
 
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import collect_from_table, empirical_policy
 from irl_gym.dynamic_programming import policy_iteration, value_iteration
 from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
+from irl_gym.facts import counted
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.metrics import normalised_score, policy_value, random_value, worst_tie
 
@@ -68,22 +70,24 @@ def test_states_left_free_lead_an_agent_astray_on_the_taxi(demonstrate):
 
 
 def test_slack_gives_up_the_state_in_which_a_noisy_expert_erred(demonstrate):
-    hard, soft = (learned(demonstrate(TAXI, 1000, 0.1), slack=slack) for slack in (None, 1.0))
+    table, best, seen = demonstrate(TAXI, 1000, 0.1)
+    hard, soft = (learned((table, best, seen), slack=slack) for slack in (None, 1.0))
     assert min(hard[1]) < 0.7 and min(soft[1]) >= 0.999
-    certificate = soft[0].certificate
-    assert certificate.violated.size == 1 and (certificate.violated_visits <= 3).all() and not certificate.expert_optimal
+    found = both(soft[0], table.mdp, most_frequent(seen))
+    assert found.violated.size == 1 and visits(seen)[found.violated].max() <= 3 and not found.expert_optimal
 
 
-def test_str_tells_how_many_rows_are_violated_and_where_nothing_is_known(demonstrate):
+def test_facts_tell_how_many_rows_are_violated_and_where_nothing_is_known(demonstrate):
+    table, best, seen = demonstrate(TAXI, 1000, 0.1)
+    found = both(learned((table, best, seen), slack=1.0)[0], table.mdp, most_frequent(seen))
+    most = f"{counted(len(found.violated_rows), 'action')}, by at most {found.worst_violation:.3g}"
+    assert f"in 1 state another action is better under it: {most}" in found.told
+    assert f"in {found.unknown.size} states that can be reached nothing is known of it" in found.told
+
+
+def test_proof_of_data_is_json_without_nan(demonstrate):
     result, _ = learned(demonstrate(TAXI, 1000, 0.1), slack=1.0)
-    found = result.certificate
-    assert f"{found.violations.size} rows of (4), in 1 states, by at most {found.worst_violation:.2e}" in str(found)
-    assert f"in {found.unknown.size} reachable states" in str(found)
-
-
-def test_certificate_of_data_is_json_without_nan(demonstrate):
-    result, _ = learned(demonstrate(TAXI, 1000, 0.1), slack=1.0)
-    told = json.loads(json.dumps(result.certificate.to_json(), allow_nan=False))
+    told = json.loads(json.dumps(result.proof.to_json(), allow_nan=False))
     assert np.shape(told["violated_rows"]) == (len(told["violations"]), 2) and told["slack"] == 1.0
 
 
@@ -140,12 +144,12 @@ def test_lambda_0_is_refused_where_states_are_avoided():
 def test_l1_below_lambda_0_is_worth_something_where_unknown_states_are_free():
     learner = FiniteLP(l1="auto", unvisited="free")
     result = learner.fit(*partial())
-    assert result.objective > 0 and result.certificate.lambda_0 == pytest.approx(learner.critical_l1(*partial()))
+    assert result.proof.objective > 0 and result.proof.lambda_0 == pytest.approx(learner.critical_l1(*partial()))
 
 
 def test_l1_above_lambda_0_makes_the_reward_zero_where_unknown_states_are_free():
     above = 1.01 * FiniteLP(unvisited="free").critical_l1(*partial())
-    assert FiniteLP(l1=above, unvisited="free").fit(*partial()).certificate.zero
+    assert FiniteLP(l1=above, unvisited="free").fit(*partial()).proof.zero
 
 
 def test_an_expert_of_which_nothing_is_known_is_refused():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from certified import certified
 
 from irl_gym.dynamic_programming import value_iteration
 from irl_gym.learners.finite import FiniteLP
@@ -63,7 +64,7 @@ def test_worst_tie_on_the_slippery_cliff_shows_what_a_state_reward_cannot_say(to
 
 def test_certificate_counts_the_one_inseparable_state_of_the_slippery_cliff(toy_text):
     table = toy_text("CliffWalking slippery")
-    certificate = FiniteLP().fit(table.mdp, plan(table)).certificate
+    certificate = certified(FiniteLP(), table.mdp, plan(table))
     assert certificate.inseparable.tolist() == [36]
 
 

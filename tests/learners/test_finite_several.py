@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import soft_reference
+from certified import both
 
 from irl_gym.errors import DegenerateExpert
 from irl_gym.learners.finite import FiniteLP
@@ -42,10 +43,10 @@ def check(seeds, unknown=0.0, **fields):
     """No gap, and nothing worse than R = 0; how many fits found a reward, at most 400, and the largest gap."""
     results = (fitted(seed, unknown, **fields) for seed in seeds)
     found = list(itertools.islice((result for result in results if result is not None), 400))
-    gaps = np.array([result.certificate.duality_gap for result in found])
+    gaps = np.array([result.proof.duality_gap for result in found])
     assert np.abs(gaps).max() < 1e-6
     if not unknown or fields.get("unvisited") == "free":  # elsewhere R = 0 has a price of its own
-        assert min(result.objective for result in found) >= -1e-9
+        assert min(result.proof.objective for result in found) >= -1e-9
     return len(found), float(np.abs(gaps).max())
 
 
@@ -86,9 +87,9 @@ def test_the_objective_is_that_of_the_dense_program(fields, unknown):
         weights = np.ones(known.size) if visits is None else visits / visits[known].mean()
         terms = {"cap": fields["margin_cap"], "l1": fields.get("l1", 0.0)}
         result = fitted(seed, unknown, unvisited="free", **fields)
-        ties = () if result is None else result.certificate.unbreakable_rows.tolist()
+        ties = () if result is None else result.proof.unbreakable_rows.tolist()
         expected = soft_reference.soft_lp(P, GAMMA, expert, weights=weights, slack=C, ties=ties, **terms)
-        assert (0.0 if result is None else result.objective) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+        assert (0.0 if result is None else result.proof.objective) == pytest.approx(expected, rel=1e-6, abs=1e-6)
         compared += result is not None
     assert compared >= 6
 
@@ -104,6 +105,7 @@ def test_violating_an_equality_earns_no_margin():
     P[B, :, B] = P[C, :, C] = P[D, :, D] = 1.0
     expert[A], expert[E] = [0.5, 0.5, 0.0], [0.5, 0.0, 0.5]
     start = np.array([0.5, 0, 0, 0, 0.5])
-    result = FiniteLP(slack=1.5, margin_cap=None).fit(TabularMDP.from_dense(P, GAMMA, start), expert)
-    assert result.objective == pytest.approx(20.0, rel=1e-6) and result.certificate.expert_optimal
+    mdp = TabularMDP.from_dense(P, GAMMA, start)
+    result = FiniteLP(slack=1.5, margin_cap=None).fit(mdp, expert)
+    assert result.proof.objective == pytest.approx(20.0, rel=1e-6) and both(result, mdp, expert).expert_optimal
     np.testing.assert_allclose(result.reward.values[[B, C, D]], [1.0, 1.0, -1.0], atol=1e-6)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import reference
 import soft_reference
+from certified import both, certified
 
 from irl_gym.errors import DegenerateExpert
 from irl_gym.learners.finite import FiniteLP
@@ -72,7 +73,7 @@ def test_objective_equals_the_dense_program(fields, slack, unvisited):
         weights = relative(model, expert, visits)
         if fields is PAPER and kind == "deterministic":
             continue  # rows of equal successors take margins there, which the dense program does not know
-        ties = () if result is None else result.certificate.unbreakable_rows.tolist()
+        ties = () if result is None else result.proof.unbreakable_rows.tolist()
         expected = soft_reference.soft_lp(
             model.P,
             0.9,
@@ -87,8 +88,8 @@ def test_objective_equals_the_dense_program(fields, slack, unvisited):
         if result is None:
             assert expected <= 1e-7
             continue
-        assert result.objective == pytest.approx(expected, rel=1e-6, abs=1e-6)
-        assert -1e-7 <= result.certificate.duality_gap <= 1e-6 * max(1.0, abs(expected))
+        assert result.proof.objective == pytest.approx(expected, rel=1e-6, abs=1e-6)
+        assert -1e-7 <= result.proof.duality_gap <= 1e-6 * max(1.0, abs(expected))
         compared += 1
     assert compared >= 6
 
@@ -100,7 +101,7 @@ def test_objective_scales_with_r_max_and_slack_does_not(r_max):
         one, scaled = (fitted(model, expert, visits, slack=1.5, r_max=r, margin_cap=None) for r in (1.0, r_max))
         assert (one is None) == (scaled is None)
         if one is not None and scaled is not None:
-            assert scaled.objective == pytest.approx(r_max * one.objective, rel=1e-5)
+            assert scaled.proof.objective == pytest.approx(r_max * one.proof.objective, rel=1e-5)
 
 
 # --- what must hold of every answer ---
@@ -115,11 +116,9 @@ def test_violations_are_those_of_the_best_continuation(fields):
         if result is None or not np.isnan(expert).any():
             continue
         margins = true_margins(model, expert, result.reward.values)
-        certificate = result.certificate
-        for (s, a), amount, count in zip(
-            certificate.violated_rows, certificate.violations, certificate.violated_visits, strict=True
-        ):
-            assert amount == pytest.approx(-margins[s, a], abs=1e-9) and count == visits[s]
+        certificate = both(result, model.mdp, expert)
+        for (s, a), amount in zip(certificate.violated_rows, certificate.violations, strict=True):
+            assert amount == pytest.approx(-margins[s, a], abs=1e-9)
         assert certificate.violations.size == (margins < -1.1 * 2e-8).sum()
         assert certificate.worst_violation == pytest.approx(np.nanmax(-margins.clip(max=0)), abs=1e-9)
         assert np.abs(result.reward.values).max() <= 1.0
@@ -133,7 +132,8 @@ def test_margins_are_those_of_the_best_continuation():
         result = FiniteLP().fit(model.mdp, expert)
         margins = true_margins(model, expert, result.reward.values)
         margins[expert > 0] = np.inf
-        np.testing.assert_allclose(result.certificate.margin, np.where(np.isnan(expert[:, 0]), np.nan, margins.min(axis=1)))
+        found = both(result, model.mdp, expert).margin
+        np.testing.assert_allclose(found, np.where(np.isnan(expert[:, 0]), np.nan, margins.min(axis=1)))
 
 
 def test_expert_is_optimal_where_it_is_known_whatever_is_done_elsewhere():
@@ -142,13 +142,14 @@ def test_expert_is_optimal_where_it_is_known_whatever_is_done_elsewhere():
         result = FiniteLP().fit(model.mdp, expert)
         known = ~np.isnan(expert).any(axis=1)
         best = reference.optimal_actions(model.P, 0.9, model.P @ result.reward.values)
-        assert not result.certificate.violated.size and (best == model.expert)[known].all()
-        assert result.certificate.expert_optimal is not False  # by what it does where it was not seen
+        found = both(result, model.mdp, expert)
+        assert not found.violated.size and (best == model.expert)[known].all()
+        assert found.expert_optimal is not False  # by what it does where it was not seen
 
 
 def test_states_not_visited_have_no_rows():
     model, expert, _ = seen(3)
-    certificate = FiniteLP(slack=1.0).fit(model.mdp, expert).certificate
+    certificate = certified(FiniteLP(slack=1.0), model.mdp, expert)
     unknown = np.flatnonzero(np.isnan(expert).any(axis=1))
     assert certificate.unknown.tolist() == unknown.tolist() and np.isnan(certificate.margin[unknown]).all()
     assert not np.isin(unknown, certificate.unconstrained).any() and not np.isin(unknown, certificate.marginless).any()
@@ -159,8 +160,9 @@ def test_a_large_slack_gives_the_hard_program():
         model, expert, visits = seen(seed)
         for fields in (CAPPED, PRICED, {}):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, expert, visits=visits) for C in (None, 1e4))
-            assert soft.objective == pytest.approx(hard.objective, rel=1e-6, abs=1e-8)
-            assert soft.certificate.expert_optimal is not False and not soft.certificate.violated.size
+            assert soft.proof.objective == pytest.approx(hard.proof.objective, rel=1e-6, abs=1e-8)
+            found = both(soft, model.mdp, expert)
+            assert found.expert_optimal is not False and not found.violated.size
 
 
 def test_a_large_slack_gives_the_hard_program_where_the_expert_is_known_everywhere():
@@ -168,15 +170,15 @@ def test_a_large_slack_gives_the_hard_program_where_the_expert_is_known_everywhe
         model = models.random_model(seed, kind="walls")
         for fields in (CAPPED, PRICED, {}, PAPER):
             hard, soft = (FiniteLP(slack=C, **fields).fit(model.mdp, model.expert) for C in (None, 1e4))
-            assert soft.objective == pytest.approx(hard.objective, rel=1e-6, abs=1e-8)
+            assert soft.proof.objective == pytest.approx(hard.proof.objective, rel=1e-6, abs=1e-8)
 
 
 def test_slack_makes_something_of_an_expert_that_no_reward_explains():
     swapping = models.ring([[1, 0], [0, 1]])  # it leaves each state for the other: both would have to be the better one
     with pytest.raises(DegenerateExpert):
         FiniteLP().fit(swapping, np.array([0, 0]))
-    found = FiniteLP(slack=1.0).fit(swapping, np.array([0, 0]), visits=np.array([10.0, 1.0])).certificate
-    assert found.margin[0] > 0 and found.violated.tolist() == [1] and found.violated_visits.tolist() == [1.0]
+    found = certified(FiniteLP(slack=1.0), swapping, np.array([0, 0]), visits=np.array([10.0, 1.0]))
+    assert found.margin[0] > 0 and found.violated.tolist() == [1]
 
 
 def test_a_set_of_actions_is_asked_to_be_equally_good():
@@ -193,15 +195,15 @@ def test_steps_pay_for_an_expert_that_is_known_in_part():
         result = FiniteLP(reward_on="state-action").fit(model.mdp, expert)
         Q = reference.action_values(model.P, 0.9, result.reward.values, reference.values(model.P, 0.9, result.reward.values))
         known = ~np.isnan(expert).any(axis=1) & ~model.mdp.terminal
-        assert (Q.argmax(axis=1) == model.expert)[known].all() and not result.certificate.violated.size
-        assert result.certificate.duality_gap == pytest.approx(0, abs=1e-7)
+        assert (Q.argmax(axis=1) == model.expert)[known].all() and not both(result, model.mdp, expert).violated.size
+        assert result.proof.duality_gap == pytest.approx(0, abs=1e-7)
 
 
 @pytest.mark.parametrize("fields", [PAPER, PRICED, {"margin_cap": "auto", "l1": 0.01}])
 def test_steps_have_no_duality_gap(fields):
     for seed in range(10):
         model, expert, _ = seen(seed, "terminal")
-        certificate = FiniteLP(reward_on="state-action", **fields).fit(model.mdp, expert).certificate
+        certificate = certified(FiniteLP(reward_on="state-action", **fields), model.mdp, expert)
         assert certificate.duality_gap == pytest.approx(0, abs=1e-6)
 
 

@@ -5,6 +5,7 @@ import models
 import numpy as np
 import pytest
 import soft_reference
+from certified import both, certified
 from scipy.optimize import linprog
 
 from irl_gym.comparisons import compare
@@ -46,24 +47,24 @@ def breakable(mdp: TabularMDP, expert: np.ndarray) -> np.ndarray:
 def ties_left(mdp: TabularMDP, expert: np.ndarray, found) -> int:
     """How many rows that can be strict have less than the margin promised."""
     margins = row_margins(mdp, compare(mdp, expert), TabularReward(found.reward.values))
-    return int((margins[breakable(mdp, expert)] < found.certificate.margin_cap * (1 - 1e-6)).sum())
+    return int((margins[breakable(mdp, expert)] < found.proof.margin_cap * (1 - 1e-6)).sum())
 
 
 def test_falling_has_a_margin_where_staying_can_have_none():
-    found = FiniteLP().fit(swapping(), np.zeros(3, dtype=int))
-    assert found.certificate.unbreakable_rows.tolist() == [[0, 1], [1, 1]]
-    assert found.certificate.margin[:2] == pytest.approx([found.certificate.margin_cap] * 2, rel=1e-6)
-    assert found.certificate.expert_optimal and found.certificate.marginless.size == 0
-    assert found.certificate.least_l1_norm == pytest.approx(found.certificate.l1_norm, rel=1e-6)
-    assert "2 rows of (4), in 2 states" in str(found.certificate)
+    found = certified(FiniteLP(), swapping(), np.zeros(3, dtype=int))
+    assert found.unbreakable_rows.tolist() == [[0, 1], [1, 1]]
+    assert found.margin[:2] == pytest.approx([found.margin_cap] * 2, rel=1e-6)
+    assert found.expert_optimal and found.marginless.size == 0
+    assert found.least_l1_norm == pytest.approx(found.l1_norm, rel=1e-6)
+    assert "2 actions in 2 states: no reward of this kind" in found.told
 
 
 @pytest.mark.parametrize("fields", [{"margin_cap": 0.5}, {"margin_cap": 0.5, "l1": 0.01}, {"l1": "auto"}, {"slack": 10.0}])
 def test_every_capped_program_leaves_out_rows_and_not_states(fields):
     mdp, expert = swapping(), np.zeros(3, dtype=int)
-    found = FiniteLP(**fields).fit(mdp, expert)
-    assert (found.certificate.margin[:2] > 0.1).all()
-    assert found.certificate.duality_gap < 1e-6
+    found = certified(FiniteLP(**fields), mdp, expert)
+    assert (found.margin[:2] > 0.1).all()
+    assert found.duality_gap < 1e-6
 
 
 def test_the_price_at_which_the_reward_vanishes_is_that_of_the_rows_that_can_be_strict():
@@ -87,9 +88,9 @@ def test_the_doctor_speaks_of_the_one_action_that_always_ties():
 def test_an_expert_unknown_in_a_state_loses_only_the_row_that_none_makes_strict():
     mdp, expert = five_states(), np.eye(3)[np.zeros(5, dtype=int)]
     expert[4] = np.nan
-    found = FiniteLP().fit(mdp, expert)
-    assert found.certificate.unbreakable_rows.tolist() == [[0, 1], [1, 1]]
-    assert (found.certificate.margin[[0, 1, 3]] >= found.certificate.margin_cap * (1 - 1e-6)).all()
+    found = certified(FiniteLP(), mdp, expert)
+    assert found.unbreakable_rows.tolist() == [[0, 1], [1, 1]]
+    assert (found.margin[[0, 1, 3]] >= found.margin_cap * (1 - 1e-6)).all()
 
 
 def left_over(seeds: range) -> tuple[int, int, int]:
@@ -103,9 +104,9 @@ def left_over(seeds: range) -> tuple[int, int, int]:
         c, can = compare(mdp, expert), breakable(mdp, expert)
         if can.any():
             found = FiniteLP().fit(mdp, expert)
-            assert len(found.certificate.unbreakable_rows) == int((~can & ~c.trivial).sum()), seed
+            assert len(found.proof.unbreakable_rows) == int((~can & ~c.trivial).sum()), seed
             experts, left = experts + 1, left + ties_left(mdp, expert, found)
-            unbreakable += len(found.certificate.unbreakable_rows)
+            unbreakable += len(found.proof.unbreakable_rows)
     return experts, left, unbreakable
 
 
@@ -162,7 +163,7 @@ def test_an_expert_known_in_part_loses_the_rows_that_none_makes_strict_and_no_ot
         can = soft_reference.breakable(P, 0.9, expert)
         if not can.any():
             continue
-        certificate = FiniteLP(**fields).fit(mdp, expert).certificate
+        certificate = certified(FiniteLP(**fields), mdp, expert)
         if certificate.violated.size:
             continue  # slack gave states up
         known = ~np.isnan(expert).any(axis=1)
@@ -187,7 +188,7 @@ def erring() -> tuple[TabularMDP, np.ndarray]:
 def test_slack_that_gives_a_state_up_leaves_rows_out_and_not_states(cap):
     mdp, expert = erring()
     found = FiniteLP(slack=5.0, margin_cap=cap).fit(mdp, expert, visits=np.array([9.0, 9, 9, 9, 9, 9, 1]))
-    certificate = found.certificate
+    certificate = both(found, mdp, expert)
     assert certificate.violated.tolist() == [6] and found.stats["states_given_up"] == 1
     assert [0, 1] in certificate.unbreakable_rows.tolist() and [1, 1] in certificate.unbreakable_rows.tolist()
     assert (certificate.margin[[0, 1, 3, 5]] >= certificate.margin_cap * (1 - 1e-6)).all()

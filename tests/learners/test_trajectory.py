@@ -53,12 +53,12 @@ def test_trajectory_lp_solves_the_program_of_the_paper_in_every_round(penalty, l
         theirs = discounted_sums(expert, OneHot(8), GAMMA, horizon=least_horizon(GAMMA)).mean(axis=0)
         for number, result in enumerate(learner(penalty=penalty, l1=l1).iterate(world, expert), start=1):
             gaps = theirs - np.array([sums.mean(axis=0) for sums in world.seen[:number]])
-            assert result.objective == pytest.approx(section_5_lp(gaps, penalty, l1), rel=1e-7, abs=1e-7)
+            assert result.proof.objective == pytest.approx(section_5_lp(gaps, penalty, l1), rel=1e-7, abs=1e-7)
 
 
 def test_trajectory_lp_begins_with_random_actions_and_adds_what_it_planned(run):
     world, _, results = run
-    assert len(world.seen) == 5 and [one.certificate.gaps.size for one in results] == [1, 2, 3, 4]
+    assert len(world.seen) == 5 and [one.proof.gaps.size for one in results] == [1, 2, 3, 4]
     np.testing.assert_array_equal(world.asked, [one.reward.alpha for one in results])
 
 
@@ -66,7 +66,7 @@ def test_trajectory_lp_begins_with_random_actions_and_adds_what_it_planned(run):
 
 
 def test_trajectory_lp_duals_close_the_gap(run):
-    assert all(-1e-9 <= one.certificate.duality_gap < 1e-6 for one in run[2])
+    assert all(-1e-9 <= one.proof.duality_gap < 1e-6 for one in run[2])
 
 
 def test_trajectory_lp_keeps_the_weights_within_the_box(run):
@@ -78,8 +78,8 @@ def test_trajectory_lp_gaps_are_the_experts_advantage_under_the_reward(run):
     theirs = discounted_sums(expert, OneHot(8), GAMMA, horizon=least_horizon(GAMMA)).mean(axis=0)
     for number, one in enumerate(results, start=1):
         expected = [(theirs - sums.mean(axis=0)) @ one.reward.alpha for sums in world.seen[:number]]
-        np.testing.assert_allclose(one.certificate.gaps, expected, atol=1e-12)
-        assert one.certificate.regret == pytest.approx((world.seen[number].mean(axis=0) - theirs) @ one.reward.alpha)
+        np.testing.assert_allclose(one.proof.gaps, expected, atol=1e-12)
+        assert one.proof.regret == pytest.approx((world.seen[number].mean(axis=0) - theirs) @ one.reward.alpha)
 
 
 def test_trajectory_lp_distance_bounds_every_difference_of_values(run):
@@ -88,7 +88,7 @@ def test_trajectory_lp_distance_bounds_every_difference_of_values(run):
     rewards = np.random.default_rng(0).uniform(-1, 1, size=(200, 8))
     for number, one in enumerate(results, start=1):
         differences = np.abs(rewards @ (theirs - world.seen[number].mean(axis=0)))
-        assert differences.max() <= one.certificate.distance == np.abs(theirs - world.seen[number].mean(axis=0)).sum()
+        assert differences.max() <= one.proof.distance == np.abs(theirs - world.seen[number].mean(axis=0)).sum()
 
 
 def test_trajectory_lp_standard_errors_are_calibrated():
@@ -98,7 +98,7 @@ def test_trajectory_lp_standard_errors_are_calibrated():
     phi = np.stack([world.model.R, np.full(8, 0.1)], axis=1)
     for seed in range(60):
         one = next(learner(features=phi, trajectories=40, horizon=100, seed=1000 * seed).iterate(world, world.expert(40, seed)))
-        alpha, found = one.reward.alpha, one.certificate
+        alpha, found = one.reward.alpha, one.proof
         theirs, first, new = (world.exact(p, phi) @ alpha for p in (world.policy(world.model.R), None, one.policy))
         gap, regret = found.gaps[0] - (theirs - first), found.regret - (new - theirs)
         strays.append([gap / found.gap_errors[0], regret / found.regret_error])
@@ -112,7 +112,7 @@ def test_trajectory_lp_states_the_bound_of_footnote_2():
     expert = world.expert(10)
     (one,) = learner(features=phi, horizon=7, max_rounds=1).iterate(world, expert)
     largest = max(np.abs(phi[episode.observations]).sum(axis=1).max() for episode in expert)
-    assert one.certificate.truncation == pytest.approx(GAMMA**8 * largest / (1 - GAMMA))
+    assert one.proof.truncation == pytest.approx(GAMMA**8 * largest / (1 - GAMMA))
 
 
 # --- the horizon ---
@@ -122,7 +122,7 @@ def test_trajectory_lp_states_the_bound_of_footnote_2():
 def test_trajectory_lp_cuts_trajectories_after_the_horizon(asked, expected):
     world = Chain()
     (one,) = learner(horizon=asked, max_rounds=1).iterate(world, world.expert(5))
-    assert one.certificate.horizon == expected
+    assert one.proof.horizon == expected
 
 
 def test_trajectory_lp_shares_its_time_among_all_rounds(monkeypatch):
@@ -139,14 +139,14 @@ def test_trajectory_lp_cuts_all_where_a_time_limit_cut_the_expert():
     expert = [*world.expert(5), *world.expert(30, horizon=2), *world.expert(5, horizon=3)]
     assert any(episode.truncated for episode in expert)
     (one,) = learner(max_rounds=1).iterate(world, expert)
-    assert one.certificate.horizon == 2
+    assert one.proof.horizon == 2
 
 
 def test_trajectory_lp_drops_an_episode_that_broke_off():
     world = Chain()
     whole, (broken,) = world.expert(5), world.expert(1, horizon=2)
     (one,) = learner(max_rounds=1).iterate(world, [*whole, replace(broken, terminated=False, truncated=True)])
-    assert (one.certificate.horizon, one.stats["episodes_dropped"]) == (least_horizon(GAMMA), 1)
+    assert (one.proof.horizon, one.stats["episodes_dropped"]) == (least_horizon(GAMMA), 1)
 
 
 def test_usable_says_what_is_missing_when_every_episode_broke_off():
@@ -171,16 +171,16 @@ def fitted():
 
 def test_fit_returns_the_round_with_the_least_distance(fitted):
     found, results = fitted
-    distances = [one.certificate.distance for one in results]
+    distances = [one.proof.distance for one in results]
     distances = distances[: len(found.stats["rounds"])]
-    assert found.certificate.distance == min(distances) and found.stats["best_round"] == int(np.argmin(distances)) + 1
+    assert found.proof.distance == min(distances) and found.stats["best_round"] == int(np.argmin(distances)) + 1
 
 
 def test_fit_says_how_best_was_judged_and_keeps_every_round(fitted):
     found, results = fitted
     assert found.stats["best_by"] == "distance" and found.stats["round"] == found.stats["best_round"]
     kept = [(one["round"], one["distance"], one["regret"]) for one in found.stats["rounds"]]
-    assert kept == [(i + 1, one.certificate.distance, one.certificate.regret) for i, one in enumerate(results[: len(kept)])]
+    assert kept == [(i + 1, one.proof.distance, one.proof.regret) for i, one in enumerate(results[: len(kept)])]
     assert len(kept) > 1
 
 
@@ -203,7 +203,7 @@ def test_fit_stops_when_the_policy_cannot_be_told_from_the_expert():
     world = Chain()
     found = learner(max_rounds=50, patience=50, trajectories=100).fit(world, world.expert(20))
     assert len(found.stats["rounds"]) < 50
-    assert found.certificate.distance <= found.certificate.distance_error
+    assert found.proof.distance <= found.proof.distance_error
 
 
 def test_fit_stops_after_max_rounds():
@@ -213,13 +213,13 @@ def test_fit_stops_after_max_rounds():
 
 def test_the_same_seed_gives_the_same_result(run):
     found, again = (learner().fit(Chain(), run[1]) for _ in range(2))
-    assert found.certificate.to_json() == again.certificate.to_json()
+    assert found.proof.to_json() == again.proof.to_json()
     np.testing.assert_array_equal(found.reward.alpha, again.reward.alpha)
 
 
 def test_another_seed_draws_other_trajectories(run):
     found, other = (learner(seed=seed).fit(Chain(), run[1]) for seed in (0, 50))
-    assert found.certificate.distance != other.certificate.distance
+    assert found.proof.distance != other.proof.distance
 
 
 # --- odd but legal ---
@@ -227,13 +227,13 @@ def test_another_seed_draws_other_trajectories(run):
 
 def test_trajectory_lp_learns_from_one_episode():
     world = Chain()
-    assert np.isfinite(learner().fit(world, world.expert(1)).certificate.distance)
+    assert np.isfinite(learner().fit(world, world.expert(1)).proof.distance)
 
 
 def test_trajectory_lp_learns_from_episodes_of_one_step():
     world = Chain()
     short = [Episode(np.array([0, 7]), np.array([0]), np.zeros(1), True, False)]
-    assert learner(max_rounds=1).fit(world, short).certificate.horizon == least_horizon(GAMMA)
+    assert learner(max_rounds=1).fit(world, short).proof.horizon == least_horizon(GAMMA)
 
 
 def test_trajectory_lp_learns_one_weight():
@@ -245,10 +245,10 @@ def test_trajectory_lp_learns_one_weight():
 def test_trajectory_lp_takes_maps_tables_and_functions_alike(run):
     phi = np.random.default_rng(0).normal(size=(8, 3))
     maps = (phi, Table(phi), Functions(lambda rows: phi[rows], 3))
-    found = [learner(features=one).fit(Chain(), run[1]).objective for one in maps]
+    found = [learner(features=one).fit(Chain(), run[1]).proof.objective for one in maps]
     assert found == pytest.approx([found[0]] * 3, abs=1e-12)
 
 
 def test_trajectory_lp_says_zero_weights_when_l1_is_too_high(run):
     found = learner(l1=1e3).fit(Chain(), run[1])
-    assert found.status is Status.ZERO_WEIGHTS and found.certificate.zero and found.certificate.degenerate
+    assert found.status is Status.ZERO_WEIGHTS and found.proof.zero and found.proof.degenerate

@@ -39,7 +39,7 @@ def test_experiment_1_the_expert_is_optimal_for_both_rewards(outcome, panel):
 
 def test_experiment_1_another_price_is_solved_for_that_price():
     found = Experiment1(l1=0.5).run()
-    assert found.penalised.certificate.l1 == 0.5 and found.settings.l1 == 0.5
+    assert found.penalised.proof.l1 == 0.5 and found.settings.l1 == 0.5
 
 
 def test_experiment_1_reports_its_progress():

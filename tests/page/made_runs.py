@@ -4,11 +4,14 @@ import io
 
 import gymnasium as gym
 import numpy as np
+from patients import sampled
 from PIL import Image, ImageDraw
 
 from irl_gym.bases import RadialBasis
+from irl_gym.certificates import certificate_of
 from irl_gym.curves import Curve
 from irl_gym.dynamic_programming import policy_iteration
+from irl_gym.evaluation import reward_told
 from irl_gym.experiment import Experiment
 from irl_gym.films import Film, Moment
 from irl_gym.layouts import grid_layout
@@ -16,6 +19,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.linear_reward import LinearReward
 from irl_gym.metrics import agreement, optimal_actions, policy_value, random_value, worst_tie
 from irl_gym.names import action_names, state_name
+from irl_gym.optimality import certify
 from irl_gym.runs import Run
 from irl_gym.tabulate import tabulate
 
@@ -37,9 +41,10 @@ def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=
     layout = grid_layout(env, mdp)
     config = Experiment(env_id, 0.9, env_kwargs=kwargs, learner=learner, seed=seed).to_json()
     names = action_names(env)
+    certificate = certificate_of(result, (table, expert), episodes=False)
     metrics = {
         "policies": policies_of(mdp, true, expert, agent),
-        "reward": reward_of(table, result, expert),
+        "reward": reward_of(table, result, expert, certificate),
         "training": {"environment_steps": 4000, "steps_to_0.9": 1200, "steps_to_0.99": 1600},
         "table": table_told(table),
         "demonstrations": {"given": False, "episodes_only": False, "episodes": 10, "dataset": "made-v0"},
@@ -51,7 +56,7 @@ def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=
         path=path, config=config,
         version={"format": "irl_gym.Run/1", "irl_gym": "0.0", "command": [*SCRIPT, "--env-id", env_id, "--seed", str(seed)]},
         env_id=env_id, actions=names, table=table, learned=result.reward, expert=expert, agent=agent,
-        certificate=result.certificate.to_json(), metrics=metrics,
+        certificate=certificate, metrics=metrics,
         curve=Curve(steps.astype(float), grown, grown * 1.1, grown - 0.1 * abs(level), grown * 1.1 + 0.1 * abs(level)),
         stages={"reward": {"seconds": 0.4}, "agent": {"seconds": 131.0, "environment_steps": 4000}, "report": {"seconds": 1.0}},
         grid=layout,
@@ -74,14 +79,12 @@ def policies_of(mdp, true, expert, agent):
     return told
 
 
-def reward_of(table, result, expert):
+def reward_of(table, result, expert, certificate):
     mdp, true = table.mdp, table.reward
-    held = result.certificate.to_json()
     top, bottom, worst = policy_value(mdp, true, expert), random_value(mdp, true), worst_tie(mdp, result.reward, true).value
-    told = {key: value for key, value in held.items() if not isinstance(value, list)}
-    counts = {f"{key}_states": len(held[key]) for key in ("inseparable", "marginless", "unconstrained")}
     regret = {"worst_tie_regret": top - worst, "worst_tie_regret_share": (top - worst) / (top - bottom)}
-    return {"learner": "FiniteLP", "status": result.status.value, **told, **counts, **regret, "worst_tie_value": worst}
+    told = {"learner": "FiniteLP", "status": result.status.value, **reward_told(certificate)}
+    return {**told, **regret, "worst_tie_value": worst}
 
 
 def table_told(table):
@@ -94,10 +97,10 @@ def table_told(table):
 
 def path_of(mdp, expert, reward_on):
     """Rewards at a few lambdas: not the whole path, but shaped like it."""
-    top = FiniteLP(report_lambda_0=True).fit(mdp, expert).certificate.lambda_0
+    top = FiniteLP(report_lambda_0=True).fit(mdp, expert).proof.lambda_0
     ends = np.linspace(0, top, 7)
     found = [FiniteLP(l1=float(l1), reward_on=reward_on).fit(mdp, expert) for l1 in (0.0, *(ends[1:-1] + 0.01 * top))]
-    margins = np.stack([one.certificate.margin for one in found])
+    margins = np.stack([certify(mdp, expert, one.reward).margin for one in found])
     rewards = np.stack([one.reward.values for one in found])
     changes = [{"sentence": f"At price {at:.3g} a reward becomes 0."} for at in ends]
     norms = np.abs(rewards).sum(axis=1)
@@ -169,16 +172,11 @@ def stepped_run(path, *, seed=0):
         "random": {**row, "value": 20.0, "score": 0.0, "mean_return": 22.0, "return_low": 20.0, "return_high": 24.0},
         "retrained": {**row, "value": 85.0, "score": 0.93, "mean_return": 450.0, "return_low": 420.0, "return_high": 480.0},
     }
-    held = {
-        "distance": 1.2, "distance_error": 0.4, "fell_short": False, "expert_optimal": True, "degenerate": False,
-        "objective": 3.1, "duality_gap": 1e-9, "n_features": 60, "rank": 8, "horizon": 300,
-        "truncation": 0.1, "l1": 0.0, "regret": -0.2,
-        "regret_error": 0.1, "gap_errors": [0.1], "gaps": [1.0],
-    }  # fmt: skip
+    certificate = certificate_of(sampled(gaps=np.array([1.0]), gap_errors=np.array([0.1]), n_features=60), None, episodes=True)
     metrics = {
         "policies": policies, "table": None, "training": {"environment_steps": 60_000, "steps_to_0.99": None},
         "reward": {"learner": "TrajectoryLP", "status": "Optimal.", "rounds": 5, "best_round": 3,
-                   **{key: one for key, one in held.items() if not isinstance(one, list)}},
+                   **reward_told(certificate)},
         "demonstrations": {"given": False, "episodes_only": True, "episodes": 10, "dataset": "made-v0"},
     }  # fmt: skip
     moments = [
@@ -189,7 +187,7 @@ def stepped_run(path, *, seed=0):
         path=path, config=Experiment("CartPole-v1", 0.99, seed=seed).to_json(),
         version={"format": "irl_gym.Run/1", "irl_gym": "0.0", "command": None}, env_id="CartPole-v1",
         actions=("push left", "push right"), table=None, learned=learned, expert=None, agent=None,
-        certificate=held, metrics=metrics,
+        certificate=certificate, metrics=metrics,
         curve=Curve(*np.array([[0.0, 30_000, 60_000], [20, 60, 85], [22, 200, 450], [20, 150, 420], [24, 240, 480]])),
         stages={"agent": {"seconds": 50.0, "environment_steps": 60_000}}, grid=None,
         films={"agent": Film("agent", 3, tuple(moments), "cut", (), "webp", "pygame is not installed.")},

@@ -37,7 +37,7 @@ def scene_of(run):
 
 def test_the_feasible_set_is_told_with_its_margin(lake):
     lead = widths(scene_of(lake)).lead
-    assert "within +-1" in lead and f"at least {lake.certificate['margin_cap']:.4f}" in lead
+    assert "within +-1" in lead and f"at least {lake.certificate['proof']['margin_cap']:.4f}" in lead
 
 
 def test_the_margin_has_no_number_where_the_run_had_another_cap(lake):
@@ -92,11 +92,20 @@ def test_a_score_has_one_form(lake):
     assert told["figures"][0]["value"] == score and f"a score of {score} and a mean return of" in told["sentence"]
 
 
-def test_rounding_is_no_distance_to_the_optimum(lake):
-    held = {**lake.certificate, "duality_gap": 1e-15}
-    assert dict(certificate(replace(lake, certificate=held)).shown["lines"])["Objective"].endswith(
-        "to rounding the best possible"
-    )
+def test_the_certificate_tells_the_facts_of_the_reward_and_those_of_its_program(lake):
+    of_reward, of_program = certificate(lake).shown["parts"]
+    assert of_reward["title"] == "Of the reward: computed again for this page"
+    assert of_program["title"] == "Of its program: the run's own record"
+    assert dict(of_program["lines"])["objective of the program"].endswith("to rounding the best possible")
+    assert dict(of_reward["lines"])["expert optimal under it"].startswith("yes")
+
+
+def test_facts_are_text_and_never_markup(lake, tmp_path):
+    forged = {"label": "<b>tied</b>", "sentence": "<script>alert(1)</script>", "mood": "bad"}
+    held = {**lake.certificate, "proof": {**lake.certificate["proof"], "facts": [forged]}}
+    write_comparison([replace(lake, certificate=held), lake], tmp_path / "two.html")
+    text = (tmp_path / "two.html").read_text()
+    assert "&lt;script&gt;alert(1)" in text and "<script>alert(1)" not in text and "<b>tied" not in text
 
 
 def test_why_there_are_no_pictures_is_a_sentence(lake):

@@ -38,7 +38,8 @@ def test_a_folder_that_is_no_run_gets_one_clear_line(script, tmp_path):
 @pytest.mark.parametrize("name", ["report", "doctor"])
 def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     held = without_digests(copied / "run") / "certificate.json"
-    held.write_text(json.dumps({**json.loads(held.read_text()), "margin": "wide", "margin_cap": [], "states": "all"}))
+    told = json.loads(held.read_text())
+    held.write_text(json.dumps({**told, "proof": {**told["proof"], "margin": "wide", "margin_cap": [], "states": "all"}}))
     (copied / "run" / "metrics.json").write_text(json.dumps({"policies": [], "table": {"states": 16}, "reward": "good"}))
     made = script(name, "--run", "run", cwd=copied)
     assert "Traceback" not in made.stderr and made.stderr.count("\n") <= 1

@@ -42,18 +42,18 @@ def test_the_reward_leads_to_the_goal_by_the_shortest_way(world, result):
     assert value == pytest.approx(-(1 - 0.9**13) / 0.1)
 
 
-def test_the_reward_is_certified(result):
-    assert isinstance(result.certificate, Proof) and result.certificate.expert_optimal and not result.certificate.degenerate
+def test_the_reward_is_proved(result):
+    assert isinstance(result.proof, Proof) and result.proof.expert_optimal and not result.proof.degenerate
 
 
 def test_the_result_survives_pickle(result):
     again = pickle.loads(pickle.dumps(result))
-    assert again.certificate.to_json() == result.certificate.to_json() and again.stats == result.stats
+    assert again.proof.to_json() == result.proof.to_json() and again.stats == result.stats
 
 
-def test_the_certificate_is_json(result):
-    told = json.loads(json.dumps(result.certificate.to_json()))
-    assert told["distance"] == result.certificate.distance and told["gaps"] == result.certificate.gaps.tolist()
+def test_the_proof_is_json(result):
+    told = json.loads(json.dumps(result.proof.to_json()))
+    assert told["distance"] == result.proof.distance and told["gaps"] == result.proof.gaps.tolist()
     assert {"expert_optimal", "duality_gap", "degenerate", "truncation", "horizon", "rank"} <= set(told)
 
 
@@ -65,13 +65,28 @@ def test_a_record_is_json_when_one_episode_tells_no_error(world, episodes):
 
 
 def test_sampled_values_are_compared_as_they_are_when_one_episode_tells_no_error(result):
-    unsure = replace(result.certificate, gaps=np.ones(1), gap_errors=np.full(1, np.nan), regret_error=np.nan, regret=-0.5)
+    unsure = replace(result.proof, gaps=np.ones(1), gap_errors=np.full(1, np.nan), regret_error=np.nan, regret=-0.5)
     assert unsure.expert_optimal and not replace(unsure, regret=0.5).expert_optimal
 
 
-@pytest.mark.parametrize("word", ["expert best under R      yes", "distance to the expert", "cut after 44 steps", "have rank"])
-def test_the_certificate_reads_as_a_page(result, word):
-    assert word in str(result.certificate)
+@pytest.mark.parametrize("word", ["expert best by its episodes   yes", "distance to the expert", "cut after 44 steps", "rank"])
+def test_the_proof_reads_as_a_page(result, word):
+    assert word in str(result.proof)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(0.2, "gains 0.5 over the expert; standard error 0.2"), (np.nan, "gains 0.5 over the expert; one episode tells no noise")],
+)
+def test_an_expert_that_is_beaten_is_told_with_the_noise(result, error, words):
+    first = replace(result.proof, regret=0.5, regret_error=error).facts()[0]
+    assert first.sentence == f"no: the policy planned for it {words}" and first.mood == "bad"
+
+
+def test_the_best_round_is_told_where_it_was_chosen(result):
+    told = {one.label: one.sentence for one in result.facts()}
+    assert told["best round"].startswith(f"{result.stats['best_round']} of {len(result.stats['rounds'])}, by its policy's")
+    assert all(one.label != "best round" for one in replace(result.proof, rounds=None).facts())
 
 
 def test_the_reward_notes_its_learner_and_the_scaling(result):

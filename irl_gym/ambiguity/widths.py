@@ -30,9 +30,9 @@ from irl_gym.checks import checked_number, is_word
 from irl_gym.deadline import Deadline
 from irl_gym.errors import InvalidParameter, SolverInfeasible
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.finite_proof import served
 from irl_gym.learners.programs import NO_MARGIN, RewardOn
 from irl_gym.mdp import TabularMDP
-from irl_gym.optimality import certify
 
 Pins = Mapping[Any, float]
 """State, or (state, action), -> its reward."""
@@ -158,8 +158,7 @@ def served_actions(learner: FiniteLP, mdp: TabularMDP, expert: Any) -> tuple[Act
         DegenerateExpert: there are none.
     """
     found = replace(learner, l1=0.0, margin_cap="auto").fit(mdp, expert)
-    margin = certify(mdp, expert, found.reward, unbreakable=found.proof.unbreakable_rows).margin
-    return found.proof.served(margin, mdp.n_actions), found.proof.margin_cap or 0.0
+    return served(mdp, expert, found.reward, found.proof), found.proof.margin_cap or 0.0
 
 
 def _half_of_largest(the_set: RewardSet, pinned: Any, r_max: float, deadline: Deadline) -> float:

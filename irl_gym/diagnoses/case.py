@@ -20,10 +20,10 @@ from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.howard import Optimum
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.learners.finite_proof import served
 from irl_gym.margins import Margins, best_margins, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import Tie, ties_of, worst_tie
-from irl_gym.optimality import certify
 from irl_gym.policies import as_distribution, completed
 from irl_gym.rewards import TabularReward
 
@@ -282,12 +282,9 @@ class Case:
     @cached_property
     def can_have_margin(self) -> ActionSets | None:
         """(S, A) rows of (4) that some reward makes strict; None where that is not known."""
-        if self.best is None or isinstance(self.best, DegenerateExpert):
+        if self.mdp is None or self.best is None or isinstance(self.best, DegenerateExpert):
             return None
-        assert self.mdp is not None
-        proof = self.best.proof
-        margin = certify(self.mdp, self.expert, self.best.reward, unbreakable=proof.unbreakable_rows).margin
-        return proof.served(margin, self.mdp.n_actions)
+        return served(self.mdp, self.expert, self.best.reward, self.best.proof)
 
     @cached_property
     def best(self) -> IRLResult | DegenerateExpert | None:

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym._typing import ActionSets, Indices, Vector
+from irl_gym._typing import ActionSets, Indices
 from irl_gym.comparisons import Comparisons
 from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
 from irl_gym.facts import Fact, counted
 from irl_gym.margins import least_per_state, row_margins
 from irl_gym.mdp import TabularMDP
+from irl_gym.optimality import certify
 from irl_gym.proven import Proven, cap_told, plain
 from irl_gym.rewards import TabularReward
 
@@ -57,12 +58,6 @@ class FiniteProof(Proven):
         """States with such a row."""
         return np.unique(self.unbreakable_rows[:, 0])
 
-    def served(self, margin: Vector, n_actions: int) -> ActionSets:
-        """(S, A) actions of states with half of the cap or more as their margin (S,), but those listed as unbreakable."""
-        found = (np.nan_to_num(margin) > (self.margin_cap or 0.0) / 2)[:, None].repeat(n_actions, axis=1)
-        found[tuple(self.unbreakable_rows.T)] = False
-        return found
-
     def facts(self) -> tuple[Fact, ...]:
         """All of this, in sentences."""
         return tuple(self._facts())
@@ -87,6 +82,14 @@ class FiniteProof(Proven):
     def to_json(self) -> dict[str, Any]:
         """As json holds it: NaN and infinity become None."""
         return plain(self, "duality_gap", "unbreakable")
+
+
+def served(mdp: TabularMDP, expert: Any, reward: TabularReward, proof: FiniteProof) -> ActionSets:
+    """(S, A) actions of states in which an expert's margin is half of the cap or more, but those listed as unbreakable."""
+    margin = certify(mdp, expert, reward, unbreakable=proof.unbreakable_rows).margin
+    found = (np.nan_to_num(margin) > (proof.margin_cap or 0.0) / 2)[:, None].repeat(mdp.n_actions, axis=1)
+    found[tuple(proof.unbreakable_rows.T)] = False
+    return found
 
 
 def prove(

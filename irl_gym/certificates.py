@@ -59,7 +59,8 @@ def optimality_told(found: Optimality, table: Tabulation) -> dict[str, Any]:
     more = (FREQUENT,) if found.errs else ()
     if not table.evidence.exact and found.sampling_error is None:
         more += (ESTIMATE,)
-    return {**found.to_json(), "facts": [one.to_json() for one in (*found.facts(), *more)]}
+    first, *others = found.facts()
+    return {**found.to_json(), "facts": [one.to_json() for one in (first, *more, *others)]}
 
 
 def read_certificate(path: Path) -> dict[str, Any]:

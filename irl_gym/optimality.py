@@ -116,16 +116,15 @@ class Optimality:
             told = f"in {counted(self.violated.size)} another action is better under it: {rows}, by at most {most}"
             yield Fact("violated", told, "bad")
         if self.tied.size and not self.zero:
-            told = f"in {counted(self.tied.size)} another action is as good as the expert's, and none better"
+            told = f"in {counted(self.tied.size)} another action is as good as the expert's to rounding, and none better"
             yield Fact("tied", told, "open")
         if self.unsettled.size:
             told = f"in {counted(self.unsettled.size)} a margin is within its sampling error, and may be noise"
             yield Fact("left open by the counts", f"{told}; more steps to count tell", "open")
         if self.inseparable.size:
-            told = f"in {counted(self.inseparable.size)} an action leads where the expert's own does: no reward on states tells"
-            yield Fact(
-                "cannot be settled", f"{told} them apart, one on states and actions can (--reward-on state-action)", "open"
-            )
+            sure = "" if self.sampling_error is None else ", as far as the counts tell"
+            told = f"in {counted(self.inseparable.size)} an action leads where the expert's own does{sure}: no reward on states"
+            yield Fact("cannot be settled", f"{told} tells them apart, one on states and actions can", "open")
         if self.unconstrained.size:
             told = f"in {counted(self.unconstrained.size)} no action that the expert leaves out can be told from its own"
             yield Fact("without a comparison", told)

@@ -1,6 +1,7 @@
 """What every learner's proof says of its program's optimum, and how json holds such records."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,10 @@ class Proven:
 
     def facts(self) -> tuple[Fact, ...]:
         """What the proof says, in sentences."""
-        raise NotImplementedError
+        return tuple(self._facts())
+
+    def _facts(self) -> Iterator[Fact]:
+        yield self.optimum
 
     def __str__(self) -> str:
         """The facts, line by line."""

@@ -91,6 +91,7 @@ def test_the_certificate_says_what_it_is_judged_on():
     table, expert = counts("large")
     found = both(result, table.mdp, expert)
     assert "a counted table, margins within" in found.told and found.unsettled.size
+    assert "leads where the expert's own does, as far as the counts tell" in found.told and found.inseparable.size
 
 
 def test_the_doctor_names_margins_within_their_sampling_error():

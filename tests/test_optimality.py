@@ -188,7 +188,7 @@ def test_a_state_with_a_better_action_is_never_called_tied():
 def test_a_state_without_a_better_action_is_called_tied():
     found = certify(crossing(), np.array([0, 1, 0, 0, 0, 0]), np.array([0, 0, 0.5, 0.2, 0, 0.5]))
     assert found.violated.tolist() == [1] and found.tied.tolist() == [4]
-    assert told(found)["tied"] == "in 1 state another action is as good as the expert's, and none better"
+    assert told(found)["tied"] == "in 1 state another action is as good as the expert's to rounding, and none better"
 
 
 def test_a_zero_reward_is_degenerate_and_no_list_of_ties():

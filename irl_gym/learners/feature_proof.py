@@ -53,12 +53,8 @@ class FeatureProof(Proven):
         """States of S_0 with such a row."""
         return np.unique(self.unbreakable_rows[:, 0])
 
-    def facts(self) -> tuple[Fact, ...]:
-        """All of this, in sentences."""
-        return tuple(self._facts())
-
     def _facts(self) -> Iterator[Fact]:
-        yield self.optimum
+        yield from super()._facts()
         yield cap_told(self.margin_cap)
         yield features_told(self.n_features, self.rank)
         told = f"{counted(self.states)} in which actions are compared; {self.trivial:,} more have none to compare"

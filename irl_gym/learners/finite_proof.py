@@ -58,12 +58,8 @@ class FiniteProof(Proven):
         """States with such a row."""
         return np.unique(self.unbreakable_rows[:, 0])
 
-    def facts(self) -> tuple[Fact, ...]:
-        """All of this, in sentences."""
-        return tuple(self._facts())
-
     def _facts(self) -> Iterator[Fact]:
-        yield self.optimum
+        yield from super()._facts()
         zero = "not computed" if self.lambda_0 is None else f"{self.lambda_0:.5g}, from which on R is 0"
         yield Fact("lambda, the price of ||R||_1", f"{self.l1:.5g}; lambda_0 {zero}")
         yield cap_told(self.margin_cap)
@@ -86,7 +82,7 @@ class FiniteProof(Proven):
 
 def served(mdp: TabularMDP, expert: Any, reward: TabularReward, proof: FiniteProof) -> ActionSets:
     """(S, A) actions of states in which an expert's margin is half of the cap or more, but those listed as unbreakable."""
-    margin = certify(mdp, expert, reward, unbreakable=proof.unbreakable_rows).margin
+    margin = certify(mdp, expert, reward, errs=proof.slack is not None, unbreakable=proof.unbreakable_rows).margin
     found = (np.nan_to_num(margin) > (proof.margin_cap or 0.0) / 2)[:, None].repeat(mdp.n_actions, axis=1)
     found[tuple(proof.unbreakable_rows.T)] = False
     return found

@@ -79,10 +79,6 @@ class TrajectoryProof(Proven):
         """Is R zero, or does it tie the expert with all policies found before?"""
         return self.zero or bool((np.abs(self.gaps) <= 2 * self.gap_errors).all())
 
-    def facts(self) -> tuple[Fact, ...]:
-        """All of this, in sentences."""
-        return tuple(self._facts())
-
     def _facts(self) -> Iterator[Fact]:
         among = f", of {self.gaps.size} policies found before and the one planned for it"
         told = "yes" if np.isnan(self.regret_error) else "yes, to two standard errors"
@@ -100,7 +96,7 @@ class TrajectoryProof(Proven):
         noise = UNKNOWN if np.isnan(self.distance_error) else f"noise alone makes about {self.distance_error:.2g}"
         most = "no reward with |alpha_i| <= 1 tells the two apart by more on these trajectories"
         yield Fact("distance to the expert", f"{self.distance:.4g} in the features; {noise}; {most}")
-        yield self.optimum
+        yield from super()._facts()
         yield features_told(self.n_features, self.rank)
         cut = f"cut after {self.horizon} steps, which changes a value under R by {self.truncation:.2g} at most"
         yield Fact("trajectories", cut)

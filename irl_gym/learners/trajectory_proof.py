@@ -86,7 +86,7 @@ class TrajectoryProof(Proven):
         good = "good" if self.expert_optimal and not self.degenerate else "bad"
         yield Fact("expert best by its episodes", told, good)
         if self.degenerate:
-            yield Fact("degenerate", "R is zero" if self.zero else TIED, "bad")
+            yield Fact("degenerate by its episodes", "R is zero" if self.zero else TIED, "bad")
         yield Fact("value gaps", f"{self.gaps.min():.4g} to {self.gaps.max():.4g}; {_noise(float(self.gap_errors.max()))}")
         short = f"; the planner fell short of the expert by {-self.regret:.3g}" if self.fell_short else ""
         gain = f"{self.regret:.4g} under R; {_noise(self.regret_error)}{short}"

@@ -210,7 +210,9 @@ def _proofs(named: Mapping[str, Run]) -> Section:
     columns = [{one.label: one.sentence for part in facts_in(run.certificate) for one in part} for run in named.values()]
     labels = dict.fromkeys(label for column in columns for label in column)
     rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
-    lead = "What each run's reward says of its expert, and what each learner proves of its program."
+    recorded = ", ".join(letter for letter, run in named.items() if not run.recomputed)
+    lead = "What each run's reward says of its expert, and by the run's own record what its learner proves of its program."
+    lead += f" Of {recorded} all of it is the record." if recorded else ""
     return _table("certificate", "Certificates", lead, named, rows)
 
 

@@ -15,10 +15,11 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.optimality import Optimality, certify
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json
+from irl_gym.sampling_error import ESTIMATED
 from irl_gym.tabulation import Tabulation
 
 FREQUENT = Fact("judged", "the actions most frequent in its episodes")
-ESTIMATE = Fact("judged on", "a table that is an estimate, with errors unknown", "open")
+ESTIMATE = Fact("judged on", ESTIMATED, "open")
 
 
 def certificate_of(result: IRLResult, known: tuple[Tabulation, Any] | None, *, episodes: bool) -> dict[str, Any]:

@@ -66,6 +66,6 @@ def aligned(facts: Iterable[Fact]) -> str:
     return "\n".join(f"{one.label:<{width}}   {one.sentence}" for one in told)
 
 
-def counted(n: int, noun: str = "state") -> str:
+def counted(n: int, noun: str = "state", plural: str | None = None) -> str:
     """A count with its noun: 1 state, 3 states."""
-    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+    return f"{n:,} {noun if n == 1 else plural or noun + 's'}"

@@ -84,6 +84,10 @@ class SamplingError:
         return largest, among & (margins > none) & (margins <= errors)
 
 
+ESTIMATED = "a table that is an estimate, with errors unknown"
+"""What is judged on a table that is neither exact nor counted."""
+
+
 def counted_table(error: float | None) -> str:
     """What is judged on a counted table; with the error of its margins where that is known."""
     return "a counted table" + (
@@ -93,11 +97,7 @@ def counted_table(error: float | None) -> str:
 
 def estimated_table(table: Mapping[str, Any], reward: Mapping[str, Any]) -> str:
     """What is judged in a run on a table that is not exact, by its records in metrics.json."""
-    return (
-        counted_table(reward.get("sampling_error"))
-        if table.get("counted")
-        else "a table that is an estimate, with errors unknown"
-    )
+    return counted_table(reward.get("sampling_error")) if table.get("counted") else ESTIMATED
 
 
 def sampling_error(table: TransitionTable, distribution: Matrix, states: np.ndarray, actions: np.ndarray) -> SamplingError:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.facts import counted as counted
 from irl_gym.intervals import TOO_FEW, Interval, as_interval
 
 MISSING = "not known"
@@ -74,11 +75,6 @@ def seconds(value: Any) -> str:
         return f"{value:.1f}\u00a0s" if value < 10 else f"{value:.0f}\u00a0s"
     minutes, rest = divmod(round(value), 60)
     return f"{minutes}\u00a0min {rest:02d}\u00a0s"
-
-
-def counted(n: int, singular: str, plural: str | None = None) -> str:
-    """A count with its noun: 1 state, 3 states."""
-    return f"{n:,} {singular if n == 1 else plural or singular + 's'}"
 
 
 def state_called(name: str) -> str:

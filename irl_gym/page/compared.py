@@ -10,9 +10,9 @@ from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, bars, spread, telling
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import aligned, counted, number, percent
 from irl_gym.rewards import TabularReward
 from irl_gym.runs import Run
+from irl_gym.written import aligned, counted, number, percent
 
 DISTANCES = {"STARC": "starc", "EPIC": "epic"}
 """Between rewards, with what metrics.json calls them."""

@@ -23,12 +23,12 @@ from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.worlds import one_world, run_places, run_title
-from irl_gym.page.written import counted, number, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.run_folder import SURPRISES
 from irl_gym.run_reader import not_understood
 from irl_gym.runs import Run
 from irl_gym.shares import judged
+from irl_gym.written import counted, number, percent, seconds
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26

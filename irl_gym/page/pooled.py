@@ -7,9 +7,9 @@ from irl_gym.page.panels import Panel
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
 from irl_gym.page.worlds import levels_of, levels_told
-from irl_gym.page.written import number, percent, with_ends
 from irl_gym.pooling import Pool, over_environments
 from irl_gym.scores import score_of
+from irl_gym.written import number, percent, with_ends
 
 TRIMMED = 4
 """Seeds from which on an interquartile mean leaves some out."""

@@ -12,11 +12,11 @@ from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
 from irl_gym.runs import Run
 from irl_gym.sampling_error import estimated_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged, returns_of
+from irl_gym.written import counted, number, percent, sentence_of, sum_of
 
 UNKNOWN = "one episode tells no noise"
 """In place of a standard error that there is none of."""

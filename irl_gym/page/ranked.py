@@ -13,10 +13,10 @@ from irl_gym.page.pooled import averaged, returned, spoken
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves, usual_levels
 from irl_gym.page.worlds import agree, levels_of, levels_told, one_scale, one_world, worth
-from irl_gym.page.written import number, sentence_of
 from irl_gym.pooling import Pool
 from irl_gym.runs import Run
 from irl_gym.scores import score_of
+from irl_gym.written import number, sentence_of
 
 TITLE = "Learning curves"
 

@@ -14,9 +14,9 @@ from irl_gym.page.document import write_page
 from irl_gym.page.proof import certificate, doctor, table_facts, verdict
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.written import interval, number, percent, seconds
 from irl_gym.runs import Run
 from irl_gym.scores import score_of
+from irl_gym.written import interval, number, percent, seconds
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
 STAGES_LEAD = (

@@ -11,8 +11,8 @@ from irl_gym.page.compared import of_states
 from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.runs import Run
+from irl_gym.written import listed, number, sentence_of
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
 COLOURS = tuple(f"run{i}" for i in range(6))

@@ -15,8 +15,8 @@ from irl_gym.page.scene import Scene
 from irl_gym.page.slider import lambda_slider
 from irl_gym.page.training import widths
 from irl_gym.page.worlds import run_places
-from irl_gym.page.written import aligned, percent, state_called
 from irl_gym.scores import score_of
+from irl_gym.written import aligned, percent, state_called
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""How the page writes numbers: few digits, thousands apart, and a word where there is none."""
+"""How numbers are written for people: few digits, thousands apart, and a word where there is none."""
 
 import math
 from collections.abc import Callable, Mapping

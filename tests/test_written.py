@@ -5,7 +5,7 @@ import pytest
 
 from irl_gym.page.document import embedded_json
 from irl_gym.page.panels import plotted, telling
-from irl_gym.page.written import interval, listed, number, percent, seconds, sentence_of, sum_of
+from irl_gym.written import interval, listed, number, percent, seconds, sentence_of, sum_of
 
 
 @pytest.mark.parametrize(

@@ -9,23 +9,23 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from irl_gym import measures
 from irl_gym.claims import ENVIRONMENT
-from irl_gym.confirmation import loss_told
 from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
-from irl_gym.intervals import as_interval
+from irl_gym.measures import explained, no_score, shown
 from irl_gym.optimality import AT_STAKE
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
 from irl_gym.run_reader import understood
-from irl_gym.scores import score_of
-from irl_gym.shares import MUCH, judged
+from irl_gym.scores import EXPERT, REFERENCES
+from irl_gym.shares import MUCH, judged, judgements
 from irl_gym.told_rewards import told_of_reward
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
 """Findings that say that what was given is not what it seems: they are told at once."""
 COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
-"""Of a score and a mean return, by how both are judged."""
+"""Of the numbers of a policy, by how its score and mean return are judged."""
 
 
 def print_report(report: Report, console: Console) -> None:
@@ -98,53 +98,25 @@ def _recorded_in(report: Report) -> str:
 
 
 def _policies(report: Report) -> Table:
+    metrics = report.metrics
+    rows, on_table = metrics["policies"], metrics["table"]
+    columns = shown(measures.POLICIES, list(rows.values()))
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
     table.add_column("policy")
-    headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
-    known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
-    found = judged(report.metrics["policies"], report.metrics["table"])
-    confirmed = any("sampled_value" in row for row in report.metrics["policies"].values())
-    more = (("value by episodes (95 %)",) if confirmed else ()) + (("agreement",) if known else ())
-    for heading in (*headings.values(), *more):
-        table.add_column(heading, justify="right")
-    for name, row in report.metrics["policies"].items():
-        score = "-" if row["score"] is None else score_of(row["score"])
-        interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
-        agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
-        by_episodes = [_by_episodes(row)] if confirmed else []
-        whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
-        style = COLOURS[found.mood] if name == "retrained" else ""
-        table.add_row(whose, f"{row['value']:.4f}", Text(score, style), Text(interval, style), *by_episodes, *agreement)
-    given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
-    errs = " with its errors" if only and not given else ""
-    table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
-    if report.metrics["policies"]["expert"]["score"] is None:
-        reason = report.metrics.get("score_reason") or "the expert earns no more than random actions"
-        table.caption += f" There is no score: {reason}."
-    if known:
-        table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
-    if confirmed:
-        told = loss_told(report.metrics["policies"]["retrained"])
-        table.caption += f" value by episodes: the same, by episodes that were not counted.{told}"
-    if report.metrics["table"] is not None:
-        table.caption += f"\ntable: {_table(report.metrics['table'])}"
-    table.caption += f"\njudged: {found.told}"
-    table.caption = Text(table.caption + _of_training(report), "table.caption")
+    for one in columns:
+        table.add_column(one.heading, justify="right")
+    for name, row in rows.items():
+        style = "" if name in REFERENCES else COLOURS[judged(rows, on_table, name).mood]
+        table.add_row(Text(name), *(Text(one.text(row), style) for one in columns))
+    told = [f"{name}: {row.get('how', 'not recorded in this version')}." for name, row in rows.items()]
+    told += explained(columns, metrics)
+    if rows[EXPERT]["score"] is None:
+        told.append(f"There is no score: {no_score(metrics)}.")
+    lines = [" ".join(told), *([f"table: {_table(on_table)}"] if on_table is not None else [])]
+    lines.append(f"judged: {judgements(rows, on_table)}{_of_training(report)}")
+    table.caption = Text("\n".join(lines), "table.caption")
     table.caption_justify = "left"
     return table
-
-
-def _by_episodes(row: Mapping[str, Any]) -> str:
-    """The value that fresh episodes say a policy has."""
-    if "sampled_value" not in row:
-        return "-"
-    return str(as_interval(row["sampled_value"], row["sampled_low"], row["sampled_high"]))
-
-
-def _shown(report: Report) -> str:
-    """How many episodes were given."""
-    count = report.metrics["demonstrations"]["episodes"]
-    return "1 episode" if count == 1 else f"{count:,} episodes"
 
 
 def _of_training(report: Report) -> str:
@@ -157,9 +129,6 @@ def _of_training(report: Report) -> str:
     return f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
 
 
-OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"
-
-
 def _table(table: Mapping[str, Any]) -> str:
     """How big the table is, where it is from, and how far off it can be."""
     errors = "; ".join(f"{name} {told}" for name, told in errors_told(table).items())
@@ -170,28 +139,16 @@ def _table(table: Mapping[str, Any]) -> str:
     return f"{table['reachable']:,} reachable states, {table['actions']} actions. {' '.join(told)}"
 
 
-def _how_valued(report: Report) -> str:
-    """Where the values come from, in a few words."""
-    table = report.metrics["table"]
-    if table is None:
-        return "discounted, from the start, mean of episodes"
-    cut = f", cut after {table['horizon']} steps" if table["horizon"] is not None else ""
-    from_data = report.metrics["demonstrations"]["given"]
-    given = f"{cut}, the expert's that of its episodes, paid by the table" if from_data else cut
-    where = "exact" if table["exact"] else "computed on a table that is an estimate"
-    return f"{where}, discounted, from the start{given}"
-
-
 def _reward(report: Report) -> Table:
     reward = report.metrics["reward"]
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
-    for what, told in told_of_reward(reward, report.metrics):
+    judged_by = shown(measures.REWARDS, [reward])
+    for what, told in (*told_of_reward(reward, report.metrics), *((one.heading, one.text(reward)) for one in judged_by)):
         table.add_row(what, Text(told))
-    tie = "worst-tie regret: what the worst policy greedy under the reward loses against the expert. "
-    told = (tie if "worst_tie_regret" in reward else "", f"{AT_STAKE} " if reward.get("loss_share") is not None else "")
-    table.caption = "".join(told) + _CAPTIONS.get(reward["learner"], "")
+    told = (*explained(judged_by, report.metrics), *([AT_STAKE] if reward.get("loss_share") is not None else []))
+    table.caption = " ".join((*told, _CAPTIONS.get(reward["learner"], "")))
     table.caption_justify = "left"
     return table
 
@@ -207,7 +164,7 @@ _CAPTIONS = {
 
 
 def _stages(report: Report) -> Table:
-    scored = report.metrics["policies"]["expert"]["score"] is not None
+    scored = report.metrics["policies"][EXPERT]["score"] is not None
     crossing = report.metrics["training"].get("steps_to_0.99")
     table = Table(title="Stages", title_justify="left", title_style="bold")
     table.add_column("stage")

@@ -4,9 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from irl_gym.optimality import told_record
-from irl_gym.page.compared import DISTANCES
 from irl_gym.sampling_error import estimated_table
-from irl_gym.shares import MUCH
 
 ROUNDING = 1e-12
 """A distance from the best possible up to this is none."""
@@ -34,32 +32,9 @@ def told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> Ite
         yield "states where it was not seen", f"{of_all}: nothing is asked of its actions there"
     if reward["degenerate"]:
         yield "degenerate", "R is zero, or ties the expert with every action, or every policy found"
-    if "worst_tie_regret" in reward:
-        yield "worst-tie regret", _worst_tie(reward)
-    known = [f"{name} {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]
-    if known:
-        yield (
-            "distance from the true one",
-            f"{', '.join(known)}; 0 ranks all policies alike, 0.71 is unrelated; the best can agree in spite of it",
-        )
     yield from {"FiniteLP": _told_finite, "FeatureLP": _told_feature, "TrajectoryLP": _told_trajectory}[reward["learner"]](
         reward
     )
-
-
-def _worst_tie(reward: Mapping[str, Any]) -> str:
-    """What the worst tie loses, where there is a scale to say it on."""
-    share = reward["worst_tie_regret_share"]
-    if share is None:
-        return "not known, as there is no score"
-    regret, of_range = _zero(reward["worst_tie_regret"]), f", {abs(share):.2%} of what the expert has over random"
-    beware = "; how an agent breaks ties decides what it earns" if share > MUCH else ""
-    return f"{regret:.4g}{of_range}{beware}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
-
-
-def _zero(value: float) -> float:
-    """A loss, without the sign of rounding."""
-    return 0.0 if abs(value) < 1e-9 else value
 
 
 def _why_not(reward: Mapping[str, Any]) -> str:

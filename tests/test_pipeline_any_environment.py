@@ -158,7 +158,7 @@ def test_an_expert_may_be_what_another_run_left(runs, tmp_path, file):
     of = "expert" if file.startswith("expert") else "retrained"
     assert again.metrics["policies"]["expert"]["value"] == pytest.approx(first.metrics["policies"][of]["value"])
     assert again.stages["expert"] | {"seconds": 0, "files": [], "sha256": {}} == {
-        "planner": "FromFile", "environment_steps": 0, "seconds": 0, "files": [], "sha256": {}
+        "planner": "FromFile", "how": "read from a file", "environment_steps": 0, "seconds": 0, "files": [], "sha256": {}
     }  # fmt: skip
 
 

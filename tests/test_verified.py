@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from forgetting import with_digests_anew
 from lake_run import asked
+from page.made_runs import verdict_of
 
 from irl_gym.errors import RunIncomplete
 from irl_gym.linear_reward import load_reward
-from irl_gym.page.proof import certificate, verdict
+from irl_gym.page.proof import certificate
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
@@ -70,7 +71,7 @@ def test_a_learner_that_judges_by_episodes_has_the_word_of_the_table_beside_its_
     found = recomputed(finished, run.config, record, run.table, run.expert, TabularReward(-run.tabular.values))
     told = replace(run, metrics={**run.metrics, "reward": record | found}, recomputed=False)
     assert found["on_table"].startswith("no: the best policy earns at least")
-    assert f"by the run's own record, and on the table: {found['on_table']}" in verdict(told)["sentence"]
+    assert f"by the run's own record, and on the table: {found['on_table']}" in verdict_of(told)["sentence"]
     assert ("Judged on the table", found["on_table"]) in certificate(told).shown["lines"]
 
 

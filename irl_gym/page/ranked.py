@@ -5,6 +5,7 @@ are worth the same. Curves are of values in one world, and of scores elsewhere.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from irl_gym.page.training import curves, usual_levels
 from irl_gym.page.worlds import agree, levels_of, levels_told, one_scale, one_world, worth
 from irl_gym.pooling import Pool
 from irl_gym.runs import Run
-from irl_gym.scores import score_of
+from irl_gym.scores import EXPERT, RANDOM, agent_of, score_of
 from irl_gym.written import number, sentence_of
 
 TITLE = "Learning curves"
@@ -23,7 +24,7 @@ TITLE = "Learning curves"
 
 def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
-    scores = {letter: run.metrics["policies"]["retrained"]["score"] for letter, run in named.items()}
+    scores = {letter: _agent(run)["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
         return "None of these runs has a score; each run's own page says why."
@@ -40,7 +41,7 @@ def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
     scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(named)}."
     if score_of(known[best]) == score_of(known[worst]):
-        paid = _returned(named, "retrained")
+        paid = _spread([_agent(run)["mean_return"] for run in named.values()])
         return f"The retrained agents have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
         f"The retrained agent of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
@@ -48,26 +49,34 @@ def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     )
 
 
+def _agent(run: Run) -> Mapping[str, Any]:
+    """The row of the policy that is spoken of."""
+    policies = run.metrics["policies"]
+    return policies[agent_of(policies)]
+
+
 def _earned(run: Run) -> str:
     """A score with its mean return."""
-    row = run.metrics["policies"]["retrained"]
+    row = _agent(run)
     return f"{score_of(row['score'])} with mean return {number(row['mean_return'])}"
 
 
 def _ends(named: Mapping[str, Run]) -> str:
     """What random actions and the expert return."""
-    return f"random actions have {_returned(named, 'random')}, the expert {_returned(named, 'expert')}"
+    random, expert = (
+        _spread([run.metrics["policies"][name]["mean_return"] for run in named.values()]) for name in (RANDOM, EXPERT)
+    )
+    return f"random actions have {random}, the expert {expert}"
 
 
-def _returned(named: Mapping[str, Run], policy: str) -> str:
-    """The mean returns of a policy: the least and the largest of the runs."""
-    found = [run.metrics["policies"][policy]["mean_return"] for run in named.values()]
+def _spread(found: Sequence[float]) -> str:
+    """Mean returns: the least and the largest."""
     return " to ".join(dict.fromkeys(map(number, (min(found), max(found)))))
 
 
 def _otherwise(named: Mapping[str, Run], best: str) -> str:
     """Which run has the highest mean return, if that is not the one with the best score."""
-    returns = {letter: run.metrics["policies"]["retrained"]["mean_return"] for letter, run in named.items()}
+    returns = {letter: _agent(run)["mean_return"] for letter, run in named.items()}
     most = max(returns, key=lambda one: returns[one])
     return "" if returns[most] == returns[best] else f" The highest mean return is that of run {most}, {number(returns[most])}."
 
@@ -76,7 +85,7 @@ def _unlike(named: Mapping[str, Run]) -> str:
     """Why scores are not on one scale."""
     if not one_world(named):
         return "The environments differ"
-    apart = "random actions are" if agree(worth(named, "expert")) else "the experts are"
+    apart = "random actions are" if agree(worth(named, EXPERT)) else "the experts are"
     return f"In these runs {apart} not worth the same"
 
 
@@ -104,7 +113,7 @@ def learning(named: Mapping[str, Run]) -> Section:
 
 def _scores(run: Run) -> tuple[np.ndarray, np.ndarray, None] | None:
     """A learning curve in scores; None where the expert is no better than random actions."""
-    low, high = (run.metrics["policies"][policy]["value"] for policy in ("random", "expert"))
+    low, high = (run.metrics["policies"][policy]["value"] for policy in (RANDOM, EXPERT))
     if low is None or high is None or not high > low:
         return None
     return run.curve.steps, (run.curve.value - low) / (high - low), None

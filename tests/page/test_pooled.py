@@ -88,7 +88,7 @@ def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):
     (pool,) = pools(lettered(runs))
     assert told(pool).startswith("runs A, B, C: no score, since not every one of the 3 seeds has one; mean return ")
     found = cells(section_of(runs))
-    assert (found["score of the retrained agents (95 %)"], found["judged by the worse of score and mean return"]) == (
+    assert (found["score of the retrained agents (95 %)"], found["the retrained agents, judged by the worse share"]) == (
         ["none"],
         ["not judged"],
     )
@@ -102,7 +102,7 @@ def test_a_pool_is_judged_by_the_worse_of_its_means(seeds):
             run = with_metrics(run, name, mean_return=mean + i, score=score + 1e-4 * i)
         runs[i] = run
     found = cells(section_of(runs))
-    assert found["judged by the worse of score and mean return"] == ["not good (0.977 of value, 0.843 of mean return)"]
+    assert found["the retrained agents, judged by the worse share"] == ["not good (0.977 of value, 0.843 of mean return)"]
     assert found["mean return of random actions and of the expert"] == ["23 and 501"]
 
 

@@ -13,7 +13,7 @@ Axes: S states, A actions.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -127,10 +127,12 @@ class Measure:
     """Does it rest on episodes? These are not kept: who reads a run has its record."""
     relative: bool = False
     """Are random actions 0 and the expert 1 by definition? Then nothing is learned from theirs."""
+    even_unknown: bool = False
+    """Is it worth saying that it is not known?"""
 
-    def known(self, told: Mapping[str, Any]) -> bool:
-        """Does a row of metrics.json hold it?"""
-        return told.get(self.keys[0]) is not None
+    def worth_telling(self, told: Mapping[str, Any]) -> bool:
+        """Has a row of metrics.json anything to say of it?"""
+        return told.get(self.keys[0]) is not None or (self.even_unknown and self.keys[0] in told)
 
     def text(self, told: Mapping[str, Any]) -> str:
         """What a row of metrics.json has of it."""
@@ -154,8 +156,8 @@ def measured(measures: Sequence[Measure], judged: Any, *, sampled: bool = True) 
 
 
 def shown(measures: Sequence[Measure], rows: Sequence[Mapping[str, Any]]) -> list[Measure]:
-    """The measures that are worth a column: those that some row of metrics.json holds."""
-    return [one for one in measures if any(one.known(row) for row in rows)]
+    """The measures that are worth a column, by the rows of metrics.json."""
+    return [one for one in measures if any(map(one.worth_telling, rows))]
 
 
 def explained(measures: Sequence[Measure], metrics: Mapping[str, Any]) -> list[str]:
@@ -172,9 +174,9 @@ def no_score(metrics: Mapping[str, Any]) -> str:
 
 
 def _interval(*numbers: float | None) -> str:
-    """A mean with its 95 % interval."""
+    """A mean with its 95 % interval, in as many digits as are worth reading."""
     estimate, low, high = numbers
-    return "not known" if estimate is None else with_ends(as_interval(estimate, low, high))
+    return "not known" if estimate is None else with_ends(as_interval(estimate, low, high), partial(number, digits=3))
 
 
 def _value_told(metrics: Mapping[str, Any]) -> str:
@@ -229,7 +231,7 @@ POLICIES: tuple[Measure, ...] = (
         lambda one: (None, None, None) if one.returns is None else (one.returns.estimate, *one.returns.ends), sampled=True,
     ),
     Measure(
-        ("return_share",), "return share", "where the mean return lies between random actions, 0, and the expert, 1", score_of,
+        ("return_share",), "returned", "the mean return as a share, random = 0, expert = 1", score_of,
         lambda one: (share_of_return(one.returns, one.by.expert, one.by.random),), sampled=True, relative=True,
     ),
     Measure(
@@ -242,6 +244,7 @@ POLICIES: tuple[Measure, ...] = (
         "of value against the policy that is best by the table, by episodes that were not counted, with 95 % confidence",
         number, lambda one: (_loses(one),),
         asked=lambda one: one.counted and one.by.horizon is None and not one.reference, sampled=True,
+        even_unknown=True,
     ),
     Measure(("agreement",), "agreement", _agreement_told, percent, lambda one: (_agrees(one),)),
 )  # fmt: skip
@@ -271,7 +274,10 @@ def _apart(one: JudgedReward, distance: Callable[..., float]) -> float | None:
 
 
 WORST = "the worst policy that is best under the learned reward"
-APART = "0 ranks all policies alike, 0.71 is unrelated, 1 the opposite; the best policies can be the same in spite of it"
+APART = (
+    "between the learned reward and the true one: 0 ranks all policies alike, 0.71 is unrelated, 1 the opposite; the best "
+    "policies can be the same in spite of it"
+)
 
 REWARDS: tuple[Measure, ...] = (
     Measure(
@@ -283,7 +289,7 @@ REWARDS: tuple[Measure, ...] = (
         ("worst_tie_regret", "worst_tie_regret_share"), "worst-tie regret", f"what {WORST} loses against the expert",
         _worst_told, lambda one: (one.lost, one.scale.share(one.lost)),
     ),
-    Measure(("starc",), "STARC distance from the true one", APART, _distance, lambda one: (_apart(one, starc),)),
-    Measure(("epic",), "EPIC distance from the true one", APART, _distance, lambda one: (_apart(one, epic),)),
+    Measure(("starc",), "STARC distance", APART, _distance, lambda one: (_apart(one, starc),)),
+    Measure(("epic",), "EPIC distance", APART, _distance, lambda one: (_apart(one, epic),)),
 )  # fmt: skip
 """Of a learned reward, where there is a table."""

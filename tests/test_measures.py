@@ -125,6 +125,7 @@ def test_measures_of_one_caption_are_explained_together():
 def test_a_number_that_was_not_asked_for_is_none_and_one_that_is_not_known_says_so():
     loses = next(one for one in measures.POLICIES if one.keys == ("loses_at_most",))
     assert (loses.text({}), loses.text({"loses_at_most": None})) == ("none", "not known")
+    assert shown([loses, TWICE], [{"loses_at_most": None, "twice": None}]) == [loses]
 
 
 # --- what is judged ---

@@ -134,11 +134,11 @@ def test_a_curve_that_ends_below_has_not_settled():
 
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(tmp_path):
     text = said(tmp_path, starc=0.684, epic=0.706)
-    assert "STARC distance from the true one │ 0.68" in text and "EPIC distance from the true one │ 0.71" in text
-    both = "STARC distance from the true one, EPIC distance from the true one: 0 ranks all policies alike"
+    assert "STARC distance │ 0.68" in text and "EPIC distance │ 0.71" in text
+    both = "STARC distance, EPIC distance: between the learned reward and the true one: 0 ranks all policies alike"
     assert both in text
     assert "EPIC" not in said(tmp_path, starc=0.5, epic=None)
-    assert "distance from" not in said(tmp_path)
+    assert "STARC" not in said(tmp_path)
 
 
 TAXI = {

@@ -24,6 +24,7 @@ TITLE = "Learning curves"
 
 def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
+    who = "retrained agent" if {agent_of(run.metrics["policies"]) for run in named.values()} == {"retrained"} else "agent"
     scores = {letter: _agent(run)["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
@@ -31,20 +32,20 @@ def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
         expert, (pool,) = "the expert" if one_scale(named) else "the own expert of each", found
         means = f"a score of {spoken(pool.score)} and a {returned(pool)}, each the {averaged(pool)} with its 95 % interval"
-        return f"Over {len(named)} seeds the retrained agents have {means}. By score random actions are 0, {expert} is 1."
+        return f"Over {len(named)} seeds the {who}s have {means}. By score random actions are 0, {expert} is 1."
     if not one_scale(named):
         each = "; ".join(f"run {letter} {_earned(run)} ({_ends({letter: run})})" for letter, run in named.items())
         return (
-            f"Scores of the retrained agents: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
+            f"Scores of the {who}s: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
             "score says how near each agent comes to its own expert, not which run is better."
         )
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
     scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(named)}."
     if score_of(known[best]) == score_of(known[worst]):
         paid = _spread([_agent(run)["mean_return"] for run in named.values()])
-        return f"The retrained agents have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
+        return f"The {who}s have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
-        f"The retrained agent of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
+        f"The {who} of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
         f"{_earned(named[worst])}.{_otherwise(named, best)} {scale}"
     )
 

@@ -157,6 +157,6 @@ def test_no_agent_is_best_across_environments(lake, tmp_path):
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(lake):
     told = replace(lake, metrics={**lake.metrics, "reward": {**lake.metrics["reward"], "starc": 0.684, "epic": None}})
     found = policies_table(told.metrics).shown
-    assert ("STARC distance from the true one", "0.68") in found["lines"] and "EPIC" not in str(found)
-    assert "STARC distance from the true one: 0 ranks all policies alike" in found["note"]
+    assert ("STARC distance", "0.68") in found["lines"] and "EPIC" not in str(found)
+    assert "STARC distance: between the learned reward and the true one: 0 ranks all policies alike" in found["note"]
     assert "distance" not in str(policies_table(lake.metrics).shown)

@@ -50,6 +50,7 @@ from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json
 from irl_gym.scorecard import RECORDS, came_about, how_of, scorecard
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
 from irl_gym.table_files import TABLE, keep_table
@@ -289,7 +290,7 @@ class Loop:
         if isinstance(world, TableWorld):
             table, horizon, learned = world.table, world.horizon, world.tabular(self.learned)
         records = {name: self.stage(name) for name in RECORDS}
-        made = {"expert": self.expert, "random": world.random, "retrained": self.agent}
+        made = {EXPERT: self.expert, RANDOM: world.random, RETRAINED: self.agent}
         how, given = came_about(config, records), None if asked.dataset is None else self.demonstrations
         rows, scale = evaluate(
             {name: (policy, how[name]) for name, policy in made.items()}, world, table, horizon, given=given,

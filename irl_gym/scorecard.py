@@ -15,7 +15,7 @@ from irl_gym.endings import LOST
 from irl_gym.estimated import evidence_told
 from irl_gym.measures import JudgedReward, measured
 from irl_gym.rewards import TabularReward
-from irl_gym.scores import EXPERT, RANDOM, Scale
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED, Scale
 from irl_gym.shares import GOOD
 from irl_gym.tabulation import Tabulation
 
@@ -101,7 +101,7 @@ def came_about(config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]
     return {
         EXPERT: f"known by {n:,} episode{'s' * (n != 1)} of the dataset" if given else f"{made}{noise}",
         RANDOM: "uniformly random actions",
-        "retrained": trained,
+        RETRAINED: trained,
     }
 
 

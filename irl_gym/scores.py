@@ -21,6 +21,8 @@ from irl_gym.metrics import normalised_score
 
 EXPERT, RANDOM = REFERENCES = ("expert", "random")
 """The judged policies whose scores are 1 and 0 by definition: what all others are measured by."""
+RETRAINED = "retrained"
+"""The agent that was retrained on the recovered reward alone: what a run of the loop is about."""
 FEWEST = 11
 """Episodes below which their spread is not believed."""
 BLUR = 0.25
@@ -100,13 +102,13 @@ def agent_of(policies: Iterable[str]) -> str:
     """
     found = others(policies)
     if not found:
-        raise KeyError("retrained")
-    return "retrained" if "retrained" in found else found[0]
+        raise KeyError(RETRAINED)
+    return RETRAINED if RETRAINED in found else found[0]
 
 
 def called(name: str) -> str:
     """What a judged policy is called in a table."""
-    return "retrained agent" if name == "retrained" else name
+    return "retrained agent" if name == RETRAINED else name
 
 
 def score_of(score: float | None) -> str:

@@ -40,7 +40,7 @@ from irl_gym.scorecard import (
     shown_told,
     table_told,
 )
-from irl_gym.scores import EXPERT, RANDOM
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED
 from irl_gym.shares import returns_of
 from irl_gym.tabulation import Tabulation
 
@@ -205,7 +205,7 @@ def again(
         return None
     given, known = known_by(config), metrics.get("expert_value") or {}
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
-    policies = {EXPERT: ("expert.npz", expert), RANDOM: ("table.npz", uniform), "retrained": ("agent_policy.npz", agent)}
+    policies = {EXPERT: ("expert.npz", expert), RANDOM: ("table.npz", uniform), RETRAINED: ("agent_policy.npz", agent)}
     read = {
         name: _read(told[name], None if given["given"] and name == EXPERT else policy, table, horizon)
         for name, (_, policy) in policies.items()

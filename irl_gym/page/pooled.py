@@ -8,7 +8,7 @@ from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
 from irl_gym.page.worlds import levels_of, levels_told
 from irl_gym.pooling import Pool, over_environments
-from irl_gym.scores import EXPERT, RANDOM, others, score_of
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED, others, score_of
 from irl_gym.written import number, percent, with_ends
 
 TRIMMED = 4
@@ -51,7 +51,12 @@ def told(pool: Pool) -> str:
     if pool.score is None:
         return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
     means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
-    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}"
+    beside = [
+        f"; {name}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
+        for name in others(pool.policies)
+        if name != pool.agent
+    ]
+    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}{''.join(beside)}"
 
 
 def returned(pool: Pool) -> str:
@@ -90,7 +95,7 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
 
 def _of_policy(pool: Pool, name: str) -> dict[str, str]:
     """What the table says of the policies of one name."""
-    whose, scores = "the retrained agents" if name == "retrained" else name, pool.scores_of(name)
+    whose, scores = "the retrained agents" if name == RETRAINED else name, pool.scores_of(name)
     ends = "none" if scores is None else " and ".join(map(score_of, (scores.min(), scores.max())))
     return {
         f"score of {whose} (95 %)": spoken(pool.score_of(name)),

@@ -16,7 +16,7 @@ from irl_gym.page.training import curves, usual_levels
 from irl_gym.page.worlds import agree, levels_of, levels_told, one_scale, one_world, worth
 from irl_gym.pooling import Pool
 from irl_gym.runs import Run
-from irl_gym.scores import EXPERT, RANDOM, agent_of, score_of
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED, agent_of, score_of
 from irl_gym.written import number, sentence_of
 
 TITLE = "Learning curves"
@@ -24,7 +24,7 @@ TITLE = "Learning curves"
 
 def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
-    who = "retrained agent" if {agent_of(run.metrics["policies"]) for run in named.values()} == {"retrained"} else "agent"
+    who = "retrained agent" if {agent_of(run.metrics["policies"]) for run in named.values()} == {RETRAINED} else "agent"
     scores = {letter: _agent(run)["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:

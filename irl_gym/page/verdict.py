@@ -10,7 +10,7 @@ from irl_gym.measures import explained, no_score, shown
 from irl_gym.page.proof import ROUNDING
 from irl_gym.page.sections import Section
 from irl_gym.sampling_error import estimated_table
-from irl_gym.scores import EXPERT, RANDOM, agent_of, called, others, score_of
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED, agent_of, called, others, score_of
 from irl_gym.shares import MUCH, judged, judgements, returns_of
 from irl_gym.written import counted, number, percent, sentence_of, sum_of
 
@@ -151,7 +151,7 @@ def _sentence(
 def _who(metrics: Mapping[str, Any]) -> str:
     """The policy that is spoken of."""
     name = agent_of(metrics["policies"])
-    if name == "retrained":
+    if name == RETRAINED:
         return "The agent that saw only the recovered reward"
     return f"The policy {name} ({how(metrics['policies'][name])})"
 

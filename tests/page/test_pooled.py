@@ -33,7 +33,7 @@ def section_of(runs, *, same=True):
 
 
 def with_metrics(run, policy, **changes):
-    policies = {**run.metrics["policies"], policy: {**run.metrics["policies"][policy], **changes}}
+    policies = {**run.metrics["policies"], policy: {**run.metrics["policies"].get(policy, {}), **changes}}
     return replace(run, metrics={**run.metrics, "policies": policies})
 
 
@@ -81,6 +81,14 @@ def test_a_pool_is_told_in_a_line(seeds):
     whose = "runs A, B, C, D, interquartile mean over 4 seeds: "
     means = r"score [0-9.]+ \(.*\), mean return [-0-9.]+ \(.*\) where random actions have .*, the expert .*"
     assert re.fullmatch(whose + means + r"; left open \(0.685 of value, 0.685 of mean return\)", told(pool))
+
+
+def test_a_fourth_policy_is_pooled_beside_the_agents(seeds):
+    runs = [with_metrics(run, "cloned", **{**run.metrics["policies"]["random"], "score": 0.1}) for run in seeds[:2]]
+    (pool,) = pools(lettered(runs))
+    assert told(pool).endswith("; cloned: score 0.100 (too few to say), not good (0.100 of value, 0.000 of mean return)")
+    found = cells(section_of(runs))
+    assert found["score of cloned (95 %)"] == ["0.100 (too few to say)"] and "score of the retrained agents (95 %)" in found
 
 
 def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):

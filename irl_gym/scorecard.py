@@ -51,12 +51,11 @@ def scorecard(
         horizon: steps that values count; None for all.
         learned: the recovered reward on the rows of the table.
     """
-    on_table = table is not None and learned is not None
+    on_table = {} if table is None or learned is None else judge_reward(learned, table, scale, horizon)
     return {
         "policies": policies,
         **scale_told(scale),
-        "reward": reward_told(certificate) | learned_told(records["reward"])
-        | (judge_reward(learned, table, scale, horizon) if on_table else {}),
+        "reward": reward_told(certificate) | learned_told(records["reward"]) | on_table,
         "training": {"environment_steps": records["agent"]["environment_steps"], **settled(curve, scale)},
         "table": None if table is None else table_told(table, horizon),
         "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"]),

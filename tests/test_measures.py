@@ -169,7 +169,9 @@ def test_a_fourth_policy_is_shown_with_how_it_came_about_in(four, place):
 def test_a_run_with_a_fourth_policy_is_read_with_it(four, copied):
     _, judged, _ = four
     write_json(copied / "metrics.json", judged.metrics)
-    assert read_run(with_digests_anew(copied)).metrics["policies"] == judged.metrics["policies"]
+    run = read_run(with_digests_anew(copied))
+    assert run.metrics["policies"] == judged.metrics["policies"]
+    assert run.whose.endswith("All else is the run's own record, and among it what is said of cloned.")
 
 
 def test_how_a_policy_came_about_follows_from_the_stages(finished):

@@ -281,7 +281,7 @@ APART = (
 
 REWARDS: tuple[Measure, ...] = (
     Measure(
-        ("reward_on",), "paid on", "what the learned reward depends on", str,
+        ("reward_on",), "reward paid on", "what the learned reward depends on", str,
         lambda one: ("state" if one.learned.on_states else "state-action",),
     ),
     Measure(("worst_tie_value",), "value of the worst tie", f"that of {WORST}", number, lambda one: (one.worst_value,)),

@@ -80,7 +80,8 @@ WORDS = {
     "metrics.json": ('"twice": ', '"least": ', '"length": '), "metrics.csv": ("retrained,twice,", "reward,least,"),
     "terminal": ("twice the value: the value two times.", "least paid", "length: mean steps"),
     "page": ("<th scope=\"col\">twice the value</th>", "<dt>least paid</dt>", "Least paid: what it pays at the least."),
-    "comparison": ("twice the value, retrained agent", "twice the value, expert", "least paid", "length, retrained agent"),
+    "comparison": ("twice the value, retrained agent", "twice the value, expert", "least paid", "length, retrained agent",
+                   "Twice the value: the value two times."),
 }  # fmt: skip
 
 

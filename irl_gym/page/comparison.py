@@ -14,7 +14,7 @@ import numpy as np
 
 from irl_gym import measures
 from irl_gym.errors import InvalidParameter
-from irl_gym.measures import shown
+from irl_gym.measures import explained, shown
 from irl_gym.page import compared, panels
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
@@ -32,7 +32,7 @@ from irl_gym.run_reader import not_understood
 from irl_gym.runs import Run
 from irl_gym.scores import REFERENCES, agent_of, called, others
 from irl_gym.shares import judged
-from irl_gym.written import counted, number, seconds
+from irl_gym.written import counted, number, seconds, sentence_of
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26
@@ -112,7 +112,20 @@ def _results(named: Mapping[str, Run]) -> Section:
     ]
     keys = list(dict.fromkeys(key for column in columns for key in column))
     rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
-    return _table("results", "Results", "Every number is under the true reward of its own environment.", named, rows)
+    lead = [
+        "Every number is under the true reward of its own environment.",
+        *_explained([run.metrics for run in named.values()]),
+    ]
+    return _table("results", "Results", " ".join(map(sentence_of, lead)), named, rows)
+
+
+def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the measures are, where that is the same in all runs; each run's own page says all of it."""
+    each = []
+    for metrics in told:
+        found = [*shown(measures.POLICIES, [*metrics["policies"].values()]), *shown(measures.REWARDS, [metrics["reward"]])]
+        each.append(explained(found, metrics))
+    return [one for one in each[0] if all(one in other for other in each)]
 
 
 def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: list[list[str]]) -> Section:

@@ -9,9 +9,9 @@ import numpy as np
 from irl_gym import plotting
 from irl_gym.cell_maps import draw_actions, draw_planes
 from irl_gym.cells import Cells
+from irl_gym.curves import read_curve
 from irl_gym.demonstrations import seen_parts
 from irl_gym.dynamic_programming import evaluate_policy
-from irl_gym.evaluation import learning_curve
 from irl_gym.layouts import GridLayout, grid_layout
 from irl_gym.linear_reward import LinearReward
 from irl_gym.listed_states import usual_observation
@@ -35,7 +35,7 @@ def draw(loop: "Loop", folder: Path) -> None:
     """Draw rewards, values, policies and the learning curve as PNG; where there is no table, returns and the curve."""
     with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
         levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
-        curve = learning_curve(loop)
+        curve = loop.folder.load("learning_curve.csv", read_curve)
         pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else {}
     if isinstance(loop.world, SteppedWorld):  # not in there: what the environment raises is no fault of the files
         pictures = _of_steps(loop, loop.world)

@@ -34,6 +34,7 @@ class FromFile:
     """Of the files, so that a run knows them again; `FromFile.at` fills it in."""
     normalize: str | None = None
     """Statistics of an agent's observations, where it was trained under VecNormalize: the file of its `save`, or an npz."""
+    how = "read from a file"
 
     def __post_init__(self) -> None:
         if not is_file(self.path):

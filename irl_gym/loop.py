@@ -28,7 +28,7 @@ from irl_gym import figures, final_stages
 from irl_gym.certificates import certificate_of, read_certificate
 from irl_gym.choices import environment_of
 from irl_gym.claims import claim, record_start, write_environment, write_version
-from irl_gym.curves import write_curve
+from irl_gym.curves import read_curve, write_curve
 from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
@@ -50,6 +50,8 @@ from irl_gym.planners import SB3, Agent, Planner
 from irl_gym.policies import Policy
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json
+from irl_gym.scorecard import RECORDS, came_about, how_of, scorecard
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED
 from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
 from irl_gym.simulator import Simulator
 from irl_gym.table_files import TABLE, keep_table
@@ -198,7 +200,7 @@ class Loop:
             policy = self.world.train(logged(planner, folder / LOGS / "expert"), None, self._share("expert", planner))
             self.world.keep(policy, folder, "expert", self.experiment.epsilon)
             made = {"environment_steps": 0, **planner.trained()} if isinstance(planner, FromFile) else _steps(policy)
-            return {"planner": type(planner).__name__, **made}
+            return {"planner": type(planner).__name__, "how": how_of(planner), **made}
         if self.seen is not None:
             np.savez(folder / "expert.npz", actions=most_frequent(self.seen))
             return {"planner": "most frequent action of the dataset", "states_seen": int(self.seen.visited.sum())}
@@ -282,10 +284,23 @@ class Loop:
         write_curve(curve, folder / "learning_curve.csv")
         if isinstance(planner, SB3):
             log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
-        return {"planner": type(planner).__name__, **_steps(policy)}
+        return {"planner": type(planner).__name__, "how": how_of(planner), **_steps(policy)}
 
     def _make_metrics(self, folder: Path) -> dict[str, Any]:
-        write_json(folder / "metrics.json", evaluate(self))
+        asked, world, config = self.experiment, self.world, self.experiment.to_json()
+        table, horizon, learned = None, None, None
+        if isinstance(world, TableWorld):
+            table, horizon, learned = world.table, world.horizon, world.tabular(self.learned)
+        records = {name: self.stage(name) for name in RECORDS}
+        made = {EXPERT: self.expert, RANDOM: world.random, RETRAINED: self.agent}
+        how, given = came_about(config, records), None if asked.dataset is None else self.demonstrations
+        rows, scale = evaluate(
+            {name: (policy, how[name]) for name, policy in made.items()}, world, table, horizon, given=given,
+            episodes_only=asked.from_episodes, episodes=asked.eval_episodes, seed=asked.seed,
+        )  # fmt: skip
+        curve = self.folder.load("learning_curve.csv", read_curve)
+        content = scorecard(config, records, self.certificate, rows, scale, curve, table, horizon, learned)
+        write_json(folder / "metrics.json", content)
         return {}
 
     def _make_figures(self, folder: Path) -> dict[str, Any]:

@@ -47,10 +47,7 @@ _ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"PPO": PPO, "DQN": DQN, "A2C": A2
 # scripts/measure_retraining.py prints what these settings reach on each environment.
 _LINEAR: dict[str, Any] = {"net_arch": []}
 DEFAULTS: dict[str, dict[str, Any]] = {
-    "PPO": {
-        "n_epochs": 4, "learning_rate": 0.03, "gae_lambda": 0.6, "ent_coef": 0.03,
-        "policy_kwargs": _LINEAR,
-    },
+    "PPO": {"n_epochs": 4, "learning_rate": 0.03, "gae_lambda": 0.6, "ent_coef": 0.03, "policy_kwargs": _LINEAR},
     "A2C": {"n_steps": 8, "learning_rate": 0.03, "gae_lambda": 0.9, "ent_coef": 0.01, "policy_kwargs": _LINEAR},
     "DQN": {
         "learning_rate": 0.01, "learning_starts": 1_000, "batch_size": 512, "train_freq": 4, "gradient_steps": 4,
@@ -83,6 +80,7 @@ class ValueIteration:
     """Evaluation sweeps after each improvement; 0 for plain value iteration."""
     preference: Sequence[int] | None = None
     """Order in which ties between actions are broken; the default is 0, 1, ..."""
+    how = "planned by value iteration"
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> TabularPolicy:
         """The optimal policy of the environment's table.
@@ -196,6 +194,8 @@ class SB3:
     """Of SB3's constructor; they override `DEFAULTS`."""
     threads: int = 1
     """Torch threads while training. Networks this small are slower on more."""
+
+    how = property(lambda self: f"trained by {self.algorithm}")
 
     def __post_init__(self) -> None:
         _algorithm(self.algorithm)

@@ -16,6 +16,7 @@ import numpy as np
 
 from irl_gym.intervals import Interval, iqm_interval
 from irl_gym.runs import Run
+from irl_gym.scores import EXPERT, RANDOM, agent_of
 from irl_gym.shares import Judged, judge
 
 PLACE = ("env_id", "env_kwargs", "dataset", "dataset_root", "table")
@@ -37,28 +38,54 @@ class Pool:
         return next(iter(self.runs.values()))
 
     @cached_property
-    def scores(self) -> np.ndarray | None:
-        """(n,) score of each retrained agent; None where a run has none."""
-        found = [run.metrics["policies"]["retrained"]["score"] for run in self.runs.values()]
+    def policies(self) -> list[str]:
+        """The names of the policies that all runs judged."""
+        rows = [run.metrics["policies"] for run in self.runs.values()]
+        return [name for name in rows[0] if all(name in row for row in rows)]
+
+    @property
+    def agent(self) -> str:
+        """The one that is spoken of."""
+        return agent_of(self.policies)
+
+    def scores_of(self, name: str) -> np.ndarray | None:
+        """(n,) score of each run's policy of a name; None where a run has none."""
+        found = [run.metrics["policies"][name]["score"] for run in self.runs.values()]
         return None if any(one is None for one in found) else np.array(found, dtype=np.float64)
 
-    @cached_property
+    def score_of(self, name: str) -> Interval | None:
+        """The interquartile mean of these scores."""
+        found = self.scores_of(name)
+        return None if found is None else over_seeds(found)
+
+    @property
+    def scores(self) -> np.ndarray | None:
+        """(n,) score of each agent; None where a run has none."""
+        return self.scores_of(self.agent)
+
+    @property
     def score(self) -> Interval | None:
         """The interquartile mean of the scores."""
-        return None if self.scores is None else over_seeds(self.scores)
+        return self.score_of(self.agent)
 
     @cached_property
     def mean_returns(self) -> dict[str, Interval]:
-        """The interquartile means of mean undiscounted returns, by policy: expert, random, retrained."""
+        """The interquartile means of mean undiscounted returns, by policy."""
         rows = [run.metrics["policies"] for run in self.runs.values()]
-        return {name: over_seeds(np.array([row[name]["mean_return"] for row in rows], dtype=np.float64)) for name in rows[0]}
+        return {
+            name: over_seeds(np.array([row[name]["mean_return"] for row in rows], dtype=np.float64)) for name in self.policies
+        }
 
-    @cached_property
+    @property
     def judged(self) -> Judged:
         """The agents by the worse share of both means."""
-        returns, table = self.mean_returns, self.first.metrics.get("table") or {}
-        means = (returns[name] for name in ("retrained", "expert", "random"))
-        return judge(self.score, *means, estimated=not table.get("exact", True))
+        return self.judged_of(self.agent)
+
+    def judged_of(self, name: str) -> Judged:
+        """The same of the policies of a name."""
+        table = self.first.metrics.get("table") or {}
+        means = (self.mean_returns[one] for one in (name, EXPERT, RANDOM))
+        return judge(self.score_of(name), *means, estimated=not table.get("exact", True))
 
     @cached_property
     def curve(self) -> tuple[np.ndarray, np.ndarray] | None:

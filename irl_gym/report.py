@@ -9,24 +9,23 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from irl_gym import measures
 from irl_gym.certificates import facts_in
 from irl_gym.claims import ENVIRONMENT
-from irl_gym.confirmation import loss_told
 from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
 from irl_gym.facts import Fact
-from irl_gym.intervals import as_interval
-from irl_gym.page.compared import DISTANCES
+from irl_gym.measures import explained, no_score, shown
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
 from irl_gym.run_reader import understood
-from irl_gym.scores import score_of
-from irl_gym.shares import MUCH, judged
+from irl_gym.scores import EXPERT, REFERENCES
+from irl_gym.shares import MUCH, judged, judgements
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
 """Findings that say that what was given is not what it seems: they are told at once."""
 COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
-"""Of a score and a mean return, by how both are judged."""
+"""Of the numbers of a policy, by how its score and mean return are judged."""
 
 
 def print_report(report: Report, console: Console) -> None:
@@ -99,53 +98,25 @@ def _recorded_in(report: Report) -> str:
 
 
 def _policies(report: Report) -> Table:
+    metrics = report.metrics
+    rows, on_table = metrics["policies"], metrics["table"]
+    columns = shown(measures.POLICIES, list(rows.values()))
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
     table.add_column("policy")
-    headings = {"value": "value", "score": "score", "mean_return": "mean return (95 %)"}
-    known = any(row["agreement"] is not None for row in report.metrics["policies"].values())
-    found = judged(report.metrics["policies"], report.metrics["table"])
-    confirmed = any("sampled_value" in row for row in report.metrics["policies"].values())
-    more = (("value by episodes (95 %)",) if confirmed else ()) + (("agreement",) if known else ())
-    for heading in (*headings.values(), *more):
-        table.add_column(heading, justify="right")
-    for name, row in report.metrics["policies"].items():
-        score = "-" if row["score"] is None else score_of(row["score"])
-        interval = str(as_interval(row["mean_return"], row["return_low"], row["return_high"]))
-        agreement = ["-" if row["agreement"] is None else f"{row['agreement']:.1%}"] if known else []
-        by_episodes = [_by_episodes(row)] if confirmed else []
-        whose = f"{name}, {_shown(report)}" if name == "expert" and report.metrics["demonstrations"]["given"] else name
-        style = COLOURS[found.mood] if name == "retrained" else ""
-        table.add_row(whose, f"{row['value']:.4f}", Text(score, style), Text(interval, style), *by_episodes, *agreement)
-    given, only = (report.metrics["demonstrations"][key] for key in ("given", "episodes_only"))
-    errs = " with its errors" if only and not given else ""
-    table.caption = f"value: {_how_valued(report)}. score: random = 0, expert{errs} = 1. mean return: undiscounted, sampled."
-    if report.metrics["policies"]["expert"]["score"] is None:
-        reason = report.metrics.get("score_reason") or "the expert earns no more than random actions"
-        table.caption += f" There is no score: {reason}."
-    if known:
-        table.caption += f" agreement: share of states with {OPTIMAL if only else OWN}."
-    if confirmed:
-        told = loss_told(report.metrics["policies"]["retrained"])
-        table.caption += f" value by episodes: the same, by episodes that were not counted.{told}"
-    if report.metrics["table"] is not None:
-        table.caption += f"\ntable: {_table(report.metrics['table'])}"
-    table.caption += f"\njudged: {found.told}"
-    table.caption = Text(table.caption + _of_training(report), "table.caption")
+    for one in columns:
+        table.add_column(one.heading, justify="right")
+    for name, row in rows.items():
+        style = "" if name in REFERENCES else COLOURS[judged(rows, on_table, name).mood]
+        table.add_row(Text(name), *(Text(one.text(row), style) for one in columns))
+    told = [f"{name}: {row.get('how', 'not recorded in this version')}." for name, row in rows.items()]
+    told += explained(columns, metrics)
+    if rows[EXPERT]["score"] is None:
+        told.append(f"There is no score: {no_score(metrics)}.")
+    lines = [" ".join(told), *([f"table: {_table(on_table)}"] if on_table is not None else [])]
+    lines.append(f"judged: {judgements(rows, on_table)}{_of_training(report)}")
+    table.caption = Text("\n".join(lines), "table.caption")
     table.caption_justify = "left"
     return table
-
-
-def _by_episodes(row: Mapping[str, Any]) -> str:
-    """The value that fresh episodes say a policy has."""
-    if "sampled_value" not in row:
-        return "-"
-    return str(as_interval(row["sampled_value"], row["sampled_low"], row["sampled_high"]))
-
-
-def _shown(report: Report) -> str:
-    """How many episodes were given."""
-    count = report.metrics["demonstrations"]["episodes"]
-    return "1 episode" if count == 1 else f"{count:,} episodes"
 
 
 def _of_training(report: Report) -> str:
@@ -158,9 +129,6 @@ def _of_training(report: Report) -> str:
     return f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
 
 
-OPTIMAL, OWN = "an optimal action", "one of the expert's actions, or an optimal one where it is optimal"
-
-
 def _table(table: Mapping[str, Any]) -> str:
     """How big the table is, where it is from, and how far off it can be."""
     errors = "; ".join(f"{name} {told}" for name, told in errors_told(table).items())
@@ -171,62 +139,23 @@ def _table(table: Mapping[str, Any]) -> str:
     return f"{table['reachable']:,} reachable states, {table['actions']} actions. {' '.join(told)}"
 
 
-def _how_valued(report: Report) -> str:
-    """Where the values come from, in a few words."""
-    table = report.metrics["table"]
-    if table is None:
-        return "discounted, from the start, mean of episodes"
-    cut = f", cut after {table['horizon']} steps" if table["horizon"] is not None else ""
-    from_data = report.metrics["demonstrations"]["given"]
-    given = f"{cut}, the expert's that of its episodes, paid by the table" if from_data else cut
-    where = "exact" if table["exact"] else "computed on a table that is an estimate"
-    return f"{where}, discounted, from the start{given}"
-
-
 def _reward(report: Report) -> Table:
     """What the reward says of the expert, what is measured of it, and what its learner proves."""
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
     of_reward, of_program = facts_in(report.certificate)
-    measured = (Fact(*one) for one in _measured(report.metrics["reward"]))
+    lines = shown(measures.REWARDS, [report.metrics["reward"]])
+    measured = [Fact(one.heading, one.text(report.metrics["reward"])) for one in lines]
     for one in (*of_reward, *measured, *of_program):
         table.add_row(one.label, Text(one.sentence, COLOURS[one.mood]))
-    if "worst_tie_regret" in report.metrics["reward"]:
-        table.caption = "worst-tie regret: what the worst policy greedy under the reward loses against the expert."
+    table.caption = " ".join(explained(lines, report.metrics))
     table.caption_justify = "left"
     return table
 
 
-def _measured(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """What is known of the reward where the true one is: what the worst tie loses, and how far it is from the true one."""
-    if "worst_tie_regret" in reward:
-        yield "worst-tie regret", _worst_tie(reward)
-    known = [f"{name} {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]
-    if known:
-        yield (
-            "distance from the true one",
-            f"{', '.join(known)}; 0 ranks all policies alike, 0.71 is unrelated; the best can agree in spite of it",
-        )
-
-
-def _worst_tie(reward: Mapping[str, Any]) -> str:
-    """What the worst tie loses, where there is a scale to say it on."""
-    share = reward["worst_tie_regret_share"]
-    if share is None:
-        return "not known, as there is no score"
-    regret, of_range = _zero(reward["worst_tie_regret"]), f", {abs(share):.2%} of what the expert has over random"
-    beware = "; how an agent breaks ties decides what it earns" if share > MUCH else ""
-    return f"{regret:.4g}{of_range}{beware}" if regret >= 0 else f"none: it gains {-regret:.4g}{of_range}"
-
-
-def _zero(value: float) -> float:
-    """A loss, without the sign of rounding."""
-    return 0.0 if abs(value) < 1e-9 else value
-
-
 def _stages(report: Report) -> Table:
-    scored = report.metrics["policies"]["expert"]["score"] is not None
+    scored = report.metrics["policies"][EXPERT]["score"] is not None
     crossing = report.metrics["training"].get("steps_to_0.99")
     table = Table(title="Stages", title_justify="left", title_style="bold")
     table.add_column("stage")

@@ -27,6 +27,7 @@ from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import START, read_json, read_record
 from irl_gym.run_reader import RunReader, understood
+from irl_gym.scores import RETRAINED, others
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
@@ -108,6 +109,7 @@ class Run:
             return "Everything is the run's own record."
         of = ("the value of its expert's episodes",) if self.config.get("dataset") is not None else ()
         of += ("values by episodes",) if any("sampled_value" in row for row in self.metrics["policies"].values()) else ()
+        of += tuple(f"what is said of {name}" for name in others(self.metrics["policies"]) if name != RETRAINED)
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 

@@ -9,6 +9,7 @@ another outcome still has a chance of up to a quarter, 1 - 0.05^(1/11), with 95 
 no chance and all episodes are the same, they are all that the expert does, and their value is exact.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,10 @@ from irl_gym._typing import Vector
 from irl_gym.intervals import LEVEL
 from irl_gym.metrics import normalised_score
 
+EXPERT, RANDOM = REFERENCES = ("expert", "random")
+"""The judged policies whose scores are 1 and 0 by definition: what all others are measured by."""
+RETRAINED = "retrained"
+"""The agent that was retrained on the recovered reward alone: what a run of the loop is about."""
 FEWEST = 11
 """Episodes below which their spread is not believed."""
 BLUR = 0.25
@@ -82,6 +87,28 @@ class Scale:
     def share(self, lost: float) -> float | None:
         """A loss in units of the scale; None where there is none."""
         return None if self.reason is not None else lost / (self.expert - self.random)
+
+
+def others(policies: Iterable[str]) -> list[str]:
+    """The judged policies that are no references, by their names."""
+    return [name for name in policies if name not in REFERENCES]
+
+
+def agent_of(policies: Iterable[str]) -> str:
+    """The one that is spoken of where there is room for one: the retrained agent, or without it the first that is no reference.
+
+    Raises:
+        KeyError: there are references only.
+    """
+    found = others(policies)
+    if not found:
+        raise KeyError(RETRAINED)
+    return RETRAINED if RETRAINED in found else found[0]
+
+
+def called(name: str) -> str:
+    """What a judged policy is called in a table."""
+    return "retrained agent" if name == RETRAINED else name
 
 
 def score_of(score: float | None) -> str:

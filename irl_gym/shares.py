@@ -23,7 +23,7 @@ import numpy as np
 
 from irl_gym.intervals import Interval, as_interval
 from irl_gym.metrics import normalised_score
-from irl_gym.scores import BLUR, score_of
+from irl_gym.scores import BLUR, EXPERT, RANDOM, agent_of, called, others, score_of
 
 GOOD = 0.9
 """A share from which on an agent is good."""
@@ -83,17 +83,24 @@ def share_of_return(agent: Interval | None, expert: Interval | None, random: Int
     return normalised_score(agent.estimate, random.estimate, expert.estimate)
 
 
-def judged(policies: Mapping[str, Mapping[str, Any]], table: Mapping[str, Any] | None) -> Judged:
-    """The judgement of a run's retrained agent.
+def judged(policies: Mapping[str, Mapping[str, Any]], table: Mapping[str, Any] | None, name: str | None = None) -> Judged:
+    """The judgement of one of a run's policies.
 
     Args:
         policies: the rows of metrics.json.
         table: its entry of that name; None where there is no table.
+        name: which; None for the one that is spoken of where there is room for one.
     """
-    score = policies["retrained"].get("score")
-    means = [returns_of(policies[name]) for name in ("retrained", "expert", "random")]
+    own = policies[agent_of(policies) if name is None else name]
+    score, means = own.get("score"), [returns_of(row) for row in (own, policies[EXPERT], policies[RANDOM])]
     estimated = not (table or {}).get("exact", True)
     return judge(None if score is None else as_interval(score, score, score), *means, estimated=estimated)
+
+
+def judgements(policies: Mapping[str, Mapping[str, Any]], table: Mapping[str, Any] | None) -> str:
+    """The judgement of every policy that is no reference, in words that follow a colon; by name where there are several."""
+    told = {name: judged(policies, table, name).told for name in others(policies)}
+    return " ".join(told.values()) if len(told) == 1 else " ".join(f"{called(name)}: {one}" for name, one in told.items())
 
 
 def judge(

@@ -20,20 +20,24 @@ from irl_gym.curves import Curve
 from irl_gym.diagnoses.unfinished import seen_with_noise
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import InvalidDiscount, InvalidReward, IrlGymError
-from irl_gym.evaluation import (
-    good_actions,
-    judged_reward,
+from irl_gym.evaluation import Candidate, good_actions, judge, scale_of
+from irl_gym.metrics import policy_value
+from irl_gym.rewards import TabularReward
+from irl_gym.run_folder import SURPRISES
+from irl_gym.scorecard import (
+    NOT_RECORDED,
+    came_about,
+    judge_reward,
+    known_by,
     learned_told,
     reward_told,
-    rounding_of,
+    scale_told,
     settled,
     shown_told,
     table_told,
 )
-from irl_gym.metrics import agreement, policy_value
-from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import SURPRISES
-from irl_gym.scores import Scale
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED
+from irl_gym.shares import returns_of
 from irl_gym.tabulation import Tabulation
 
 ROUNDING = 1e-9
@@ -94,17 +98,19 @@ def claims(
         metrics: the content of metrics.json.
         table: the run's; None where it has none.
     """
-    given = config.get("dataset") is not None
-    known = {"given": given, "episodes_only": given or bool(config.get("epsilon"))}
+    known = known_by(config)
     learner = {"learner": config["learner"]["type"]} if (config.get("learner") or {}).get("type") else {}
     yield Claim("config.json", {"reward": learner, "demonstrations": known})
+    for name, how in came_about(config, stages).items():
+        file = {EXPERT: ".stages/expert.json", RANDOM: "config.json"}.get(name, ".stages/agent.json")
+        yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
     taken = {key: one for key, one in stages["agent"].items() if key == "environment_steps"}
     yield Claim(".stages/agent.json", {"training": taken})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
-        told = table_told(table, metrics["table"].get("horizon") if given else None)
+        told = table_told(table, metrics["table"].get("horizon") if known["given"] else None)
         yield Claim("table.npz", {"table": {key: one for key, one in told.items() if key not in EVIDENCE}})
 
 
@@ -167,36 +173,34 @@ def again(
     mdp, told, horizon = table.mdp, metrics["policies"], metrics["table"].get("horizon")
     if horizon is not None and not 0 <= horizon <= MOST_STEPS:
         return None
-    given, known = config.get("dataset") is not None, metrics.get("expert_value") or {}
+    given, known = known_by(config), metrics.get("expert_value") or {}
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
-    policies = {"expert": ("expert.npz", expert), "random": ("table.npz", uniform), "retrained": ("agent_policy.npz", agent)}
-    values = {
-        name: told[name]["value"] if given and name == "expert" else policy_value(mdp, table.reward, policy, horizon)
+    policies = {EXPERT: ("expert.npz", expert), RANDOM: ("table.npz", uniform), RETRAINED: ("agent_policy.npz", agent)}
+    read = {
+        name: _read(told[name], None if given["given"] and name == EXPERT else policy, table, horizon)
         for name, (_, policy) in policies.items()
     }
-    within = WITHIN * max(map(abs, values.values()))
-    claimed = [Claim(file, {"policies": {name: {"value": values[name]}}}, within) for name, (file, _) in policies.items()]
+    within = WITHIN * max(abs(one.value) for one in read.values())
+    claimed = [Claim(file, {"policies": {name: {"value": read[name].value}}}, within) for name, (file, _) in policies.items()]
     low, high = known.get("low"), known.get("high")
-    half = 0.0 if not given else math.inf if low is None or high is None else (high - low) / 2
-    rounding = rounding_of(mdp.gamma, values["random"], values["expert"])
-    scale = Scale(values["random"], values["expert"], rounding, half, known.get("episodes") if given else None, mdp.gamma)
-    good = good_actions(mdp, None if given or config.get("epsilon") else expert, optimum(mdp, table.reward))
+    half = 0.0 if not given["given"] else math.inf if low is None or high is None else (high - low) / 2
+    scale = scale_of(read, mdp.gamma, table, half, known.get("episodes") if given["given"] else None)
+    good = good_actions(mdp, None if given["episodes_only"] else expert, optimum(mdp, table.reward))
     now = {
-        "policies": {
-            name: {
-                "value": values[name],
-                "score": scale.score(values[name]),
-                "agreement": None if given and name == "expert" else agreement(mdp, policy, good),
-            }
-            for name, (_, policy) in policies.items()
-        },
+        "policies": judge(read, scale, table, horizon, good, sampled=False),
         "score_reason": scale.reason,
-        "expert_value": {} if given else {"episodes": None, "low": values["expert"], "high": values["expert"]},
-        "reward": judged_reward(table, reward, scale, horizon),
+        "expert_value": {} if given["given"] else scale_told(scale)["expert_value"],
+        "reward": judge_reward(reward, table, scale, horizon),
         "training": settled(curve, scale),
         "table": {key: one for key, one in table_told(table, horizon).items() if key in EVIDENCE},
     }
     return claimed, now
+
+
+def _read(row: Mapping[str, Any], policy: Any, table: Tabulation, horizon: int | None) -> Candidate:
+    """A policy with its value computed now, and returns as its row of metrics.json has them; so too the value where None."""
+    value = row["value"] if policy is None else policy_value(table.mdp, table.reward, policy, horizon)
+    return Candidate(policy, row.get("how", NOT_RECORDED), value, returns_of(row))
 
 
 def with_again(told: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:

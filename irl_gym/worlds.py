@@ -205,6 +205,8 @@ class SteppedWorld:
         """Episodes of a policy, deterministic but for the random one and for noise, which is drawn anew from the seed."""
         if isinstance(policy, Noisy):  # else it would depend on the episodes before, and so on where a run was continued
             policy = replace(policy, seed=seed)
+        if isinstance(policy, RandomPolicy):
+            policy = self.random
         return run_episodes(self.env, policy, n, seed=seed, most=step_limit(self.env))
 
     def value(self, policy: Any) -> float:

@@ -153,7 +153,7 @@ CASES = [
     ("Nothing in it was run. Write them as numbers: np.savez(",
      rewards_alone, lambda root: by_hand(root, told(rewards_alone, root))),
 ]  # fmt: skip
-FILES = [f"{one}.py" for one in ("experts", "noise", "shown", "evaluation", "demonstrators", "planners", "pickled")]
+FILES = [f"{one}.py" for one in ("experts", "noise", "shown", "demonstrators", "planners", "pickled")]
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])

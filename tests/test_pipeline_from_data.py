@@ -240,7 +240,7 @@ def test_many_episodes_make_a_score_and_the_metrics_hold_the_interval(from_data)
 def test_the_report_of_two_episodes_says_whose_they_are_and_makes_no_score_of_them(two):
     text = printed(two)
     for words in (
-        "expert, 2 episodes",
+        "expert: known by 2 episodes of the dataset.",
         "There is no score: the expert's value",
         "worst-tie regret │ not known",
         "FrozenLake-v1, ",

@@ -8,10 +8,10 @@ import pytest
 from rich.console import Console
 
 from irl_gym.claims import ENVIRONMENT
-from irl_gym.evaluation import settled_at
 from irl_gym.facts import Fact
 from irl_gym.pipeline import Report
 from irl_gym.report import print_report
+from irl_gym.scorecard import settled_at
 
 CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
 
@@ -118,11 +118,12 @@ def test_a_curve_that_ends_below_has_not_settled():
 
 
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(tmp_path):
-    assert "distance from the true one │ STARC 0.68, EPIC 0.71; 0 ranks all policies alike" in said(
-        tmp_path, starc=0.684, epic=0.706
-    )
-    assert "distance from the true one │ STARC 0.50; 0" in said(tmp_path, starc=0.5, epic=None)
-    assert "distance from" not in said(tmp_path)
+    text = said(tmp_path, starc=0.684, epic=0.706)
+    assert "STARC distance │ 0.68" in text and "EPIC distance │ 0.71" in text
+    both = "STARC distance, EPIC distance: between the learned reward and the true one: 0 ranks all policies alike"
+    assert both in text
+    assert "EPIC" not in said(tmp_path, starc=0.5, epic=None)
+    assert "STARC" not in said(tmp_path)
 
 
 TAXI = {
@@ -149,7 +150,7 @@ def test_training_more_is_advised_when_the_mean_return_alone_falls_short(tmp_pat
 def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
     policies = TAXI | {"retrained": TAXI["retrained"] | {"score": score}}
     text = said(tmp_path, policies=policies, coloured=True)
-    assert f"\x1b[31m{score:.3f}\x1b" in text and "\x1b[31m-139.000 (-155.000 to -123.000)\x1b" in text
+    assert f"\x1b[31m{score:.3f}\x1b" in text and "\x1b[31m-139 (-155 to -123)\x1b" in text
 
 
 @pytest.mark.parametrize("name", ["a[/b]", "a[red]b", "a:warning:b", "a[link=x]b[/link]"])

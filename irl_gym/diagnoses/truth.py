@@ -9,7 +9,7 @@ from irl_gym.diagnoses.mends import Mend, breaking, on_steps
 from irl_gym.diagnoses.unseen import entered
 from irl_gym.dynamic_programming import backup, evaluate_policy, occupancy
 from irl_gym.metrics import policy_value, random_value
-from irl_gym.scores import FEWEST, Scale
+from irl_gym.scores import EXPERT, FEWEST, RANDOM, RETRAINED, Scale
 
 BLIND = 0.2
 """Share of what an expert had over random actions when it was trained; who lacks more may not see what it saw."""
@@ -117,7 +117,7 @@ def unconfirmed(case: Case) -> Finding | None:
             continue
         value, much = row["value"], MUCH * abs(rows["expert"]["value"] - rows["random"]["value"])
         if max(value - high, low - value) > much:
-            whose = {"retrained": "the retrained agent", "random": "a random policy"}.get(name, "the expert")
+            whose = {RETRAINED: "the retrained agent", RANDOM: "a random policy", EXPERT: "the expert"}.get(name, name)
             return Finding(
                 "table-not-confirmed",
                 f"By the counted table {whose} earns {value:.4g}, by episodes that were not counted {row['sampled_value']:.4g} "

@@ -10,12 +10,10 @@ from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, bars, spread, telling
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import aligned, counted, number, percent
 from irl_gym.rewards import TabularReward
 from irl_gym.runs import Run
+from irl_gym.written import aligned, counted, number, percent
 
-DISTANCES = {"STARC": "starc", "EPIC": "epic"}
-"""Between rewards, with what metrics.json calls them."""
 MOST_ROWS = 40
 """Rows of the table of states in which the agent deviates."""
 FEW = 4
@@ -34,19 +32,7 @@ def rewards(run: Run, scene: Scene | None) -> Section:
         "What the environment pays, which the learner never saw, beside what was recovered from the expert. Each has its own "
         "scale: many rewards make the same actions best, so the two need not look alike."
     )
-    return Section("rewards", "Rewards", lead + apart(run), made)
-
-
-def apart(run: Run) -> str:
-    """How far the two rewards are apart, in a sentence; nothing where that is not known."""
-    reward = run.metrics["reward"]
-    known = [f"{name}'s distance is {reward[key]:.2f}" for name, key in DISTANCES.items() if reward.get(key) is not None]
-    if not known:
-        return ""
-    return (
-        f" Between the two {' and '.join(known)}, where 0 is a reward that ranks all policies alike, 0.71 an unrelated one and "
-        "1 the opposite. The best policies can be the same in spite of it."
-    )
+    return Section("rewards", "Rewards", lead, made)
 
 
 def _weights(run: Run) -> Section:

@@ -7,27 +7,31 @@ in one figure, as scores where the environments differ.
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
+from irl_gym import measures
 from irl_gym.certificates import facts_in
 from irl_gym.errors import InvalidParameter
+from irl_gym.measures import explained, shown
 from irl_gym.page import compared
 from irl_gym.page.asked import written
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
 from irl_gym.page.pooled import over_seeds
-from irl_gym.page.proof import answer, finding
+from irl_gym.page.proof import finding
 from irl_gym.page.ranked import learning, sentence
-from irl_gym.page.report import policy_row
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
+from irl_gym.page.verdict import answer, how
 from irl_gym.page.worlds import one_world, run_places, run_title
-from irl_gym.page.written import counted, percent, seconds
 from irl_gym.pooling import pools
 from irl_gym.run_folder import SURPRISES
 from irl_gym.run_reader import not_understood
 from irl_gym.runs import Run
+from irl_gym.scores import REFERENCES, agent_of, called, others
 from irl_gym.shares import judged
+from irl_gym.written import counted, seconds, sentence_of
 
 SCRIPTS = ("theme.js", "figures.js")
 MOST_RUNS = 26
@@ -97,10 +101,30 @@ def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
 def _results(named: Mapping[str, Run]) -> Section:
     """One row a number, one column a run."""
     places = run_places(named)
-    columns = [dict(_numbers(run, places[letter])) for letter, run in named.items()]
+    columns = [
+        {
+            "environment": places[letter],
+            **dict(_numbers(run.metrics, recomputed=run.recomputed)),
+            "time of all stages": _time(run),
+        }
+        for letter, run in named.items()
+    ]
     keys = list(dict.fromkeys(key for column in columns for key in column))
     rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
-    return _table("results", "Results", "Every number is under the true reward of its own environment.", named, rows)
+    lead = [
+        "Every number is under the true reward of its own environment.",
+        *_explained([run.metrics for run in named.values()]),
+    ]
+    return _table("results", "Results", " ".join(map(sentence_of, lead)), named, rows)
+
+
+def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the measures are, where that is the same in all runs; each run's own page says all of it."""
+    each = []
+    for metrics in told:
+        found = [*shown(measures.POLICIES, [*metrics["policies"].values()]), *shown(measures.REWARDS, [metrics["reward"]])]
+        each.append(explained(found, metrics))
+    return [one for one in each[0] if all(one in other for other in each)]
 
 
 def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: list[list[str]]) -> Section:
@@ -108,31 +132,29 @@ def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: lis
     return Section(name, title, lead, (), "compare", shown)
 
 
-def _numbers(run: Run, place: str) -> Iterator[tuple[str, str]]:
-    """What the table of results says of a run."""
-    policies, reward = run.metrics["policies"], run.metrics["reward"]
-    told = {name: policy_row(name, row) for name, row in policies.items()}
-    yield "environment", place
-    yield "score of the retrained agent", told["retrained"]["score"]
-    for name in ("retrained", "expert", "random"):
-        yield f"mean return (95 %), {told[name]['name']}", told[name]["returns"]
-    yield "judged by the worse of score and mean return", judged(policies, run.metrics.get("table")).brief
-    for name in ("retrained", "expert", "random"):
-        yield f"value, {told[name]['name']}", told[name]["value"]
-    if any(row["agreement"] is not None for row in policies.values()):
-        yield "agreement, retrained agent", told["retrained"]["agreement"]
-    if reward.get("worst_tie_regret_share") is not None:
-        yield "lost by the worst tie", percent(max(reward["worst_tie_regret_share"], 0.0))
-    for name, key in compared.DISTANCES.items():
-        if reward.get(key) is not None:
-            yield f"{name} distance of the learned from the true reward", f"{reward[key]:.2f}"
-    whose = "" if run.recomputed else ", as recorded"
+def _time(run: Run) -> str:
+    """How long all stages took."""
+    return seconds(sum(record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"))
+
+
+def _numbers(metrics: Mapping[str, Any], *, recomputed: bool) -> Iterator[tuple[str, str]]:
+    """What the table of results says of a run's policies and reward."""
+    policies, reward = metrics["policies"], metrics["reward"]
+    told, agents = shown(measures.POLICIES, list(policies.values())), others(policies)
+    for one, name in product((one for one in told if one.relative), agents):
+        yield f"{one.heading}, {called(name)}", one.text(policies[name])
+    for name in agents:
+        yield f"{called(name)}, judged by the worse share", judged(policies, metrics.get("table"), name).brief
+    for one, name in product((one for one in told if not one.relative), (*agents, *REFERENCES)):
+        yield f"{one.heading}, {called(name)}", one.text(policies[name])
+    for name in (*agents, *REFERENCES):
+        yield f"how it came about, {called(name)}", how(policies[name])
+    yield from ((one.heading, one.text(reward)) for one in shown(measures.REWARDS, [reward]))
+    whose = "" if recomputed else ", as recorded"
     yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
-    if told["retrained"]["score"] is not None:
-        steps = run.metrics["training"].get("steps_to_0.99")
+    if policies[agent_of(policies)]["score"] is not None:
+        steps = metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
-    spent = [record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"]
-    yield "time of all stages", seconds(sum(spent))
 
 
 def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section:

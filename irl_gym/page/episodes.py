@@ -12,8 +12,8 @@ from irl_gym.films import MOST_BYTES, Film, Moment
 from irl_gym.page.maps import geometry
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, sentence_of, state_called, sum_of
 from irl_gym.runs import Run
+from irl_gym.written import counted, sentence_of, state_called, sum_of
 
 TITLES = {"expert": "Expert", "agent": "Retrained agent"}
 ENDS = {

@@ -17,7 +17,7 @@ from irl_gym.cells import Cells
 from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TransitionTable
 from irl_gym.page.panels import DIVERGING, REWARDS, Panel, axis, blank, plotted
-from irl_gym.page.written import listed
+from irl_gym.written import listed
 
 MOST_NUMBERS = 144
 """Maps of at most this many cells carry numbers."""

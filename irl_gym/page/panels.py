@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from irl_gym.page.written import listed, sum_of
+from irl_gym.written import listed, sum_of
 
 ROW = 19
 """Pixels of a bar."""

@@ -7,9 +7,9 @@ from irl_gym.page.panels import Panel
 from irl_gym.page.sections import Section
 from irl_gym.page.training import curves
 from irl_gym.page.worlds import levels_of, levels_told
-from irl_gym.page.written import number, percent, with_ends
 from irl_gym.pooling import Pool, over_environments
-from irl_gym.scores import score_of
+from irl_gym.scores import EXPERT, RANDOM, RETRAINED, others, score_of
+from irl_gym.written import number, percent, with_ends
 
 TRIMMED = 4
 """Seeds from which on an interquartile mean leaves some out."""
@@ -32,7 +32,8 @@ def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) 
     if min(len(pool.runs) for pool in found) < TRIMMED:
         lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few is wide."
     columns = [_column(pool, places) for pool in found]
-    rows = [[key, *(column[key] for column in columns)] for key in columns[0]]
+    keys = dict.fromkeys(key for column in columns for key in column)
+    rows = [[key, *(column.get(key, "not there") for column in columns)] for key in keys]
     shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
     lead += "".join(f" {_together(several, score)}" for several, score in over_environments(found))
     drawn = [pool for pool in found if pool.curve is not None] if same else []
@@ -50,13 +51,18 @@ def told(pool: Pool) -> str:
     if pool.score is None:
         return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
     means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
-    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}"
+    beside = [
+        f"; {name}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
+        for name in others(pool.policies)
+        if name != pool.agent
+    ]
+    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}{''.join(beside)}"
 
 
 def returned(pool: Pool) -> str:
     """The mean return of a pool's agents, and what there is to compare it with."""
-    random, expert = (number(pool.mean_returns[name].estimate) for name in ("random", "expert"))
-    return f"mean return {with_ends(pool.mean_returns['retrained'])} where random actions have {random}, the expert {expert}"
+    random, expert = (number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
+    return f"mean return {with_ends(pool.mean_returns[pool.agent])} where random actions have {random}, the expert {expert}"
 
 
 def averaged(pool: Pool) -> str:
@@ -73,21 +79,29 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
     """What the table says of a pool."""
     config, letter = pool.first.config, next(iter(pool.runs))
     lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values()]
-    scores, returns = pool.scores, pool.mean_returns
-    return {
+    told = {
         "environment": places[letter],
         "learner": str((config.get("learner") or {}).get("type", "")),
         "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
-        "score of the retrained agents (95 %)": spoken(pool.score),
-        "mean return of the retrained agents (95 %)": with_ends(returns["retrained"]),
-        "mean return of random actions and of the expert": " and ".join(
-            number(returns[name].estimate) for name in ("random", "expert")
-        ),
-        "judged by the worse of score and mean return": pool.judged.brief,
-        "score of the worst and the best seed": "none"
-        if scores is None
-        else " and ".join(map(score_of, (scores.min(), scores.max()))),
+    }
+    for name in others(pool.policies):
+        told |= _of_policy(pool, name)
+    ends = " and ".join(number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
+    return told | {
+        "mean return of random actions and of the expert": ends,
         "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
+    }
+
+
+def _of_policy(pool: Pool, name: str) -> dict[str, str]:
+    """What the table says of the policies of one name."""
+    whose, scores = "the retrained agents" if name == RETRAINED else name, pool.scores_of(name)
+    ends = "none" if scores is None else " and ".join(map(score_of, (scores.min(), scores.max())))
+    return {
+        f"score of {whose} (95 %)": spoken(pool.score_of(name)),
+        f"mean return of {whose} (95 %)": with_ends(pool.mean_returns[name]),
+        f"{whose}, judged by the worse share": pool.judged_of(name).brief,
+        f"score of {whose}, worst and best seed": ends,
     }
 
 

@@ -1,142 +1,18 @@
-"""The verdict, the certificate in words, and the doctor's sentences."""
+"""The certificate in words, and the doctor's sentences."""
 
 import json
 from collections.abc import Mapping
 from typing import Any
 
 from irl_gym.certificates import facts_in
-from irl_gym.confirmation import loss_told
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
-from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
 from irl_gym.runs import Run
-from irl_gym.sampling_error import estimated_table
-from irl_gym.scores import score_of
-from irl_gym.shares import MUCH, judged, returns_of
+from irl_gym.written import counted, number, sentence_of
 
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
-
-
-def verdict(run: Run) -> dict[str, Any]:
-    """The sentence at the top, four figures, each with whether it is good, and how the agent was judged."""
-    agent, reward = run.metrics["policies"]["retrained"], run.metrics["reward"]
-    score, share = agent.get("score"), reward.get("worst_tie_regret_share")
-    optimal, found = reward.get("expert_optimal"), judged(run.metrics["policies"], run.metrics.get("table"))
-    lost = "" if share is None else f"{sum_of(max(reward['worst_tie_regret'], 0.0))} of value, as a share "
-    figures = [
-        {
-            "label": "the agent's score",
-            "value": score_of(score),
-            "note": "random actions are 0, the expert is 1" if score is not None else _no_score(run),
-            "mood": found.mood,
-        },
-        {
-            "label": "the agent's mean return",
-            "value": number(agent.get("mean_return")),
-            "note": _returns(run),
-            "mood": found.mood,
-        },
-        {
-            "label": "lost by the worst tie",
-            "value": "not known" if share is None else percent(max(share, 0.0)),
-            "note": f"{lost}of what the expert has over random, by the worst policy that is best under the learned reward",
-            "mood": "plain" if share is None else "good" if share <= MUCH else "bad",
-        },
-        {
-            "label": "expert optimal under it",
-            "value": answer(optimal),
-            "note": "degenerate: the reward says nothing" if reward.get("degenerate") else _proved(reward, run.recomputed),
-            "mood": _mood(optimal, reward),
-        },
-    ]
-    return {
-        "sentence": _sentence(run, score, share, optimal),
-        "figures": figures,
-        "judged": f"How score and mean return are coloured: {found.told}",
-    }
-
-
-def _returns(run: Run) -> str:
-    """The interval of the agent's mean return, and what random actions and the expert return."""
-    agent, random, expert = (returns_of(run.metrics["policies"][name]) for name in ("retrained", "random", "expert"))
-    if agent is None:
-        return "not recorded in this version"
-    sure = f"95 %: {number(agent.low)} to {number(agent.high)}" if agent.known else f"{TOO_FEW} how surely"
-    return f"{sure}; random actions have {_mean(random)}, the expert {_mean(expert)}"
-
-
-def _mean(found: Interval | None) -> str:
-    return number(None if found is None else found.estimate)
-
-
-def _mood(optimal: bool | None, reward: Mapping[str, Any]) -> str:
-    """Of whether the expert is optimal: not good where the reward says nothing or a counted table leaves margins open."""
-    if optimal is False or reward.get("degenerate"):
-        return "bad"
-    return "good" if optimal and not reward.get("unsettled_states") else "plain"
-
-
-def answer(optimal: bool | None) -> str:
-    """Yes, no or undecided."""
-    return "undecided" if optimal is None else "yes" if optimal else "no"
-
-
-def _no_score(run: Run) -> str:
-    """Why there is no score."""
-    return str(run.metrics.get("score_reason") or "the expert earns no more than random actions")
-
-
-def _proved(reward: Mapping[str, Any], recomputed: bool) -> str:
-    gap, whose = reward.get("duality_gap"), whence(recomputed)
-    if gap is None:
-        return whose
-    if gap <= ROUNDING * max(1.0, abs(reward.get("objective") or 0.0)):
-        return f"{whose}; to rounding no reward does better in the program, as recorded"
-    return f"{whose}; the program's optimum is at most {number(gap, 2)} away, as recorded"
-
-
-def whence(recomputed: bool) -> str:
-    """Whose word it is that the expert is optimal, or not."""
-    return "computed again for this page" if recomputed else "the run's own record"
-
-
-def _sentence(run: Run, score: float | None, share: float | None, optimal: bool | None) -> str:
-    agent = run.metrics["policies"]["retrained"]
-    random, expert = (_mean(returns_of(run.metrics["policies"][name])) for name in ("random", "expert"))
-    who, returned = "The agent that saw only the recovered reward has", f"a mean return of {_mean(returns_of(agent))}"
-    earned = (
-        f"{who} a score of {score_of(score)} and {returned}: random actions have 0 and {random}, the expert has 1 and {expert}"
-        if score is not None
-        else f"{who} value {number(agent['value'])} and {returned}: random actions have {random}, the expert {expert}; "
-        f"there is no score, as {_no_score(run)}"
-    )
-    tie = (
-        ""
-        if share is None
-        else f"; the unluckiest policy that is best under that reward would lose {percent(max(share, 0.0))} of what the expert "
-        "has over random actions"
-        if share > 1e-9
-        else "; every policy that is best under that reward is as good as the expert"
-    )
-    certified = "whether the expert is optimal under it is undecided"
-    if optimal is not None:
-        certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
-    certified += "" if run.recomputed else ", by the run's own record"
-    return f"{earned}{tie}; {certified}.{_counted(run)}"
-
-
-def _counted(run: Run) -> str:
-    """What the verdict rests on, where the table is counted; nothing where it is exact."""
-    reward, agent = run.metrics["reward"], run.metrics["policies"]["retrained"]
-    table = run.metrics.get("table") or {}
-    if table.get("exact", True):
-        return ""
-    n = reward.get("unsettled_states")
-    left = f", and in {counted(n, 'state')} a margin is smaller than its error" if n else ""
-    return f" All this is judged on {estimated_table(table, reward)}{left}.{loss_told(agent)}"
 
 
 def certificate(run: Run) -> Section:
@@ -152,6 +28,11 @@ def certificate(run: Run) -> Section:
         lead = "What the learner proves, from the sampled trajectories and the reward alone. Without a table there is no more."
     shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}
     return Section("certificate", "Certificate", f"{lead} No solver's word is taken.", (), "certificate", shown)
+
+
+def whence(recomputed: bool) -> str:
+    """Whose word it is what a reward says of the expert."""
+    return "computed again for this page" if recomputed else "the run's own record"
 
 
 def doctor(run: Run) -> Section:

@@ -5,18 +5,17 @@ feasible widths, the learning curve, episodes; then what proves it, what the doc
 """
 
 import os
-from collections.abc import Mapping
 from typing import Any
 
 from irl_gym.page import compared, episodes, slider, training
 from irl_gym.page.asked import asked, reproduce
 from irl_gym.page.document import write_page
-from irl_gym.page.proof import certificate, doctor, table_facts, verdict
+from irl_gym.page.proof import certificate, doctor, table_facts
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
-from irl_gym.page.written import interval, number, percent, seconds
+from irl_gym.page.verdict import policies_table, verdict
 from irl_gym.runs import Run
-from irl_gym.scores import score_of
+from irl_gym.written import number, seconds
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
 STAGES_LEAD = (
@@ -36,7 +35,7 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
     of_states, path_data = ([], None) if scene is None else _of_states(scene)
     episode_section, episode_data = episodes.episodes(run, scene)
     sections = [
-        policies_table(run),
+        policies_table(run.metrics),
         compared.rewards(run, scene),
         *of_states,
         training.learning(run),
@@ -48,7 +47,12 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         asked(run),
         reproduce(run),
     ]
-    context = {"title": page_title(run), "facts": facts(run), "verdict": verdict(run), "sections": sections}
+    context = {
+        "title": page_title(run),
+        "facts": facts(run),
+        "verdict": verdict(run.metrics, recomputed=run.recomputed),
+        "sections": sections,
+    }
     data = {"figures": specs(sections), "slider": path_data, "episodes": episode_data}
     write_page(path, "report.html", context, data, SCRIPTS)
 
@@ -93,44 +97,3 @@ def facts(run: Run) -> list[tuple[str, str]]:
         told.append(("files", run.caution))
     told.append(("on this page", run.whose))
     return told
-
-
-def policies_table(run: Run) -> Section:
-    """Expert, random and retrained policy under the true reward."""
-    rows = [policy_row(name, row) for name, row in run.metrics["policies"].items()]
-    known = any(row["agreement"] is not None for row in run.metrics["policies"].values())
-    where = (
-        "the mean of episodes" if run.table is None else "exact" if _exact(run) else "computed on a table that is an estimate"
-    )
-    note = (
-        f"Value: discounted, from the start, {where}. Score: random actions are 0, the expert is 1. Mean return: undiscounted, "
-        "sampled, with a 95 % interval."
-    )
-    confirmed = any(row["by_episodes"] for row in rows)
-    if confirmed:
-        note += " Value by episodes: the same, by episodes that were not counted, with a 95 % interval."
-    told = run.metrics.get("expert_value") or {}
-    if told.get("episodes"):
-        note += f" The expert's value is the mean of its {told['episodes']:,} episodes."
-    if known:
-        note += " Agreement: share of states with one of the expert's actions, or an optimal one where it is optimal."
-    shown = {"rows": rows, "known": known, "confirmed": confirmed, "note": note}
-    return Section(
-        "summary", "Under the true reward", "What each policy is worth in the environment as it is.", (), "summary", shown
-    )
-
-
-def _exact(run: Run) -> bool:
-    return bool((run.metrics.get("table") or {}).get("exact", True))
-
-
-def policy_row(name: str, row: Mapping[str, Any]) -> dict[str, str]:
-    """A policy's numbers as text."""
-    return {
-        "name": {"retrained": "retrained agent"}.get(name, name),
-        "value": number(row["value"]),
-        "score": score_of(row["score"]),
-        "returns": interval(row),
-        "by_episodes": interval(row, "sampled_value", "sampled_low", "sampled_high") if "sampled_value" in row else "",
-        "agreement": "none" if row["agreement"] is None else percent(row["agreement"]),
-    }

@@ -16,11 +16,11 @@ from irl_gym.howard import Optimum
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import ties_of
 from irl_gym.page.maps import Map
-from irl_gym.page.written import state_called
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.runs import Run
 from irl_gym.tabulation import Tabulation
+from irl_gym.written import state_called
 
 LEAST_SHARE = 0.5
 """Actions less likely than this share of the most likely one are not shown."""

@@ -22,8 +22,8 @@ from irl_gym.page import maps, panels
 from irl_gym.page.panels import Panel, axis, blank, plotted, telling
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.rewards import TabularReward
+from irl_gym.written import listed, number, sentence_of
 
 MOST_PIECES = 240
 """Positions of the slider."""

@@ -11,8 +11,9 @@ from irl_gym.page.compared import of_states
 from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.page.written import listed, number, sentence_of
 from irl_gym.runs import Run
+from irl_gym.scores import agent_of
+from irl_gym.written import listed, number, sentence_of
 
 PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
 COLOURS = tuple(f"run{i}" for i in range(6))
@@ -72,7 +73,8 @@ def learning(run: Run) -> Section:
 
 def _settled(run: Run) -> str:
     """When the agent was as good as it should be; nothing where there is no score."""
-    if run.metrics["policies"]["retrained"]["score"] is None:
+    policies = run.metrics["policies"]
+    if policies[agent_of(policies)]["score"] is None:
         return ""
     taken = run.metrics["training"].get("steps_to_0.99")
     if taken is None:

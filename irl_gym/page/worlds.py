@@ -15,6 +15,7 @@ from irl_gym.page.report import page_title
 from irl_gym.page.training import COLOURS, Level, stroke, usual_levels
 from irl_gym.pooling import without_seeds
 from irl_gym.runs import Run
+from irl_gym.scores import REFERENCES
 
 WORLD = ("gamma", "start_seeds", "reveal", "bins", "samples", "table")
 """Entries of a configuration that make another world of an environment."""
@@ -88,7 +89,7 @@ def agree(values: Mapping[str, float | None]) -> bool:
 
 def one_scale(named: Mapping[str, Run]) -> bool:
     """Is a score of one run as much as the same score of another?"""
-    return one_world(named) and all(agree(worth(named, policy)) for policy in ("expert", "random"))
+    return one_world(named) and all(agree(worth(named, policy)) for policy in REFERENCES)
 
 
 def levels_of(drawn: Mapping[str, Mapping[str, Run]]) -> list[Level]:

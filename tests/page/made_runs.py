@@ -20,6 +20,7 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.metrics import agreement, optimal_actions, policy_value, random_value, worst_tie
 from irl_gym.names import action_names, state_name
 from irl_gym.optimality import certify
+from irl_gym.page.verdict import verdict
 from irl_gym.runs import Run
 from irl_gym.tabulate import tabulate
 
@@ -70,12 +71,13 @@ def policies_of(mdp, true, expert, agent):
     best = optimal_actions(mdp, true)
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
     top, bottom = policy_value(mdp, true, expert), random_value(mdp, true)
+    how = {"expert": "planned by value iteration", "random": "uniformly random actions", "retrained": "trained by PPO"}
     told = {}
     for name, policy in {"expert": expert, "random": uniform, "retrained": agent}.items():
         value = policy_value(mdp, true, policy)
         spread = {"mean_return": value * 1.1, "return_low": value * 1.1 - 0.05, "return_high": value * 1.1 + 0.05}
         score = (value - bottom) / (top - bottom)
-        told[name] = {"value": value, "score": score, **spread, "agreement": agreement(mdp, policy, best)}
+        told[name] = {"how": how[name], "value": value, "score": score, **spread, "agreement": agreement(mdp, policy, best)}
     return told
 
 
@@ -125,6 +127,11 @@ def diagnosis_of(acting):
              "states": acting[:3].tolist(), "actions": [0, 1, 0]},
         ],
     }  # fmt: skip
+
+
+def verdict_of(run):
+    """What stands at the top of a run's page."""
+    return verdict(run.metrics, recomputed=run.recomputed)
 
 
 def films_of(env, env_id, table, learned, policies, seed, frames):

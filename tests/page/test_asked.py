@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from page.made_runs import table_run
+from page.made_runs import table_run, verdict_of
 
 from irl_gym.page.asked import asked, typed
-from irl_gym.page.proof import doctor, finding, verdict
+from irl_gym.page.proof import doctor, finding
 
 SCRIPT = ("python", "scripts/recover_and_retrain.py")
 
@@ -39,7 +39,7 @@ def test_a_run_from_python_lists_what_differs_from_its_defaults(tmp_path):
 def test_the_verdict_says_why_there_is_no_score(tmp_path):
     run = table_run(tmp_path, films=False)
     policies = {name: {**row, "score": None} for name, row in run.metrics["policies"].items()}
-    told = verdict(replace(run, metrics={**run.metrics, "policies": policies, "score_reason": "two episodes are few"}))
+    told = verdict_of(replace(run, metrics={**run.metrics, "policies": policies, "score_reason": "two episodes are few"}))
     assert "there is no score, as two episodes are few" in told["sentence"]
     assert told["figures"][0]["note"] == "two episodes are few"
 

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from page.made_runs import table_run
+from page.made_runs import table_run, verdict_of
 
 from irl_gym.page.comparison import lettered, write_comparison
-from irl_gym.page.proof import verdict
 from irl_gym.page.ranked import sentence
 from irl_gym.page.report import write_report
 
@@ -37,12 +36,12 @@ def earning(run, numbers, **metrics):
     ids=["taxi", "cart", "great", "open"],
 )
 def test_score_and_mean_return_have_the_colour_of_the_worse(lake, numbers, mood):
-    first, second = verdict(earning(lake, numbers))["figures"][:2]
+    first, second = verdict_of(earning(lake, numbers))["figures"][:2]
     assert (first["mood"], second["mood"]) == (mood, mood)
 
 
 def test_the_mean_return_says_what_random_actions_and_the_expert_return(lake):
-    told = verdict(earning(lake, TAXI))
+    told = verdict_of(earning(lake, TAXI))
     assert told["figures"][1]["value"] == "-139"
     assert told["figures"][1]["note"] == "95 %: -155 to -123; random actions have -770, the expert 7.8"
     assert (
@@ -54,18 +53,20 @@ def test_the_mean_return_says_what_random_actions_and_the_expert_return(lake):
 
 def test_a_mean_return_of_too_few_says_so(lake):
     equal = CART | {"retrained": (1.0, 500.0, None)}
-    assert verdict(earning(lake, equal))["figures"][1]["note"].startswith("too few to say how surely; random actions have 22")
+    assert verdict_of(earning(lake, equal))["figures"][1]["note"].startswith(
+        "too few to say how surely; random actions have 22"
+    )
 
 
 def test_a_mean_return_without_a_score_is_shown_without_a_judgement(lake):
-    told = verdict(earning(lake, CART | {"retrained": (None, 425.0, 17.0)}))
+    told = verdict_of(earning(lake, CART | {"retrained": (None, 425.0, 17.0)}))
     assert [one["mood"] for one in told["figures"][:2]] == ["plain", "plain"] and told["figures"][1]["value"] == "425"
     assert "a mean return of 425: random actions have 22, the expert 500; there is no score" in told["sentence"]
 
 
 def test_a_run_whose_rows_have_no_returns_shows_without_them(lake):
     policies = {name: {"value": row["value"], "score": row["score"]} for name, row in lake.metrics["policies"].items()}
-    told = verdict(replace(lake, metrics={**lake.metrics, "policies": policies}))
+    told = verdict_of(replace(lake, metrics={**lake.metrics, "policies": policies}))
     assert told["figures"][1]["value"] == "not known" and told["figures"][1]["note"] == "not recorded in this version"
 
 

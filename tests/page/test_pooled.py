@@ -33,7 +33,7 @@ def section_of(runs, *, same=True):
 
 
 def with_metrics(run, policy, **changes):
-    policies = {**run.metrics["policies"], policy: {**run.metrics["policies"][policy], **changes}}
+    policies = {**run.metrics["policies"], policy: {**run.metrics["policies"].get(policy, {}), **changes}}
     return replace(run, metrics={**run.metrics, "policies": policies})
 
 
@@ -83,12 +83,20 @@ def test_a_pool_is_told_in_a_line(seeds):
     assert re.fullmatch(whose + means + r"; left open \(0.685 of value, 0.685 of mean return\)", told(pool))
 
 
+def test_a_fourth_policy_is_pooled_beside_the_agents(seeds):
+    runs = [with_metrics(run, "cloned", **{**run.metrics["policies"]["random"], "score": 0.1}) for run in seeds[:2]]
+    (pool,) = pools(lettered(runs))
+    assert told(pool).endswith("; cloned: score 0.100 (too few to say), not good (0.100 of value, 0.000 of mean return)")
+    found = cells(section_of(runs))
+    assert found["score of cloned (95 %)"] == ["0.100 (too few to say)"] and "score of the retrained agents (95 %)" in found
+
+
 def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):
     runs = [with_metrics(seeds[0], "retrained", score=None), *seeds[1:3]]
     (pool,) = pools(lettered(runs))
     assert told(pool).startswith("runs A, B, C: no score, since not every one of the 3 seeds has one; mean return ")
     found = cells(section_of(runs))
-    assert (found["score of the retrained agents (95 %)"], found["judged by the worse of score and mean return"]) == (
+    assert (found["score of the retrained agents (95 %)"], found["the retrained agents, judged by the worse share"]) == (
         ["none"],
         ["not judged"],
     )
@@ -102,7 +110,7 @@ def test_a_pool_is_judged_by_the_worse_of_its_means(seeds):
             run = with_metrics(run, name, mean_return=mean + i, score=score + 1e-4 * i)
         runs[i] = run
     found = cells(section_of(runs))
-    assert found["judged by the worse of score and mean return"] == ["not good (0.977 of value, 0.843 of mean return)"]
+    assert found["the retrained agents, judged by the worse share"] == ["not good (0.977 of value, 0.843 of mean return)"]
     assert found["mean return of random actions and of the expert"] == ["23 and 501"]
 
 

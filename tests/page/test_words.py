@@ -4,19 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page.made_runs import stepped_run, table_run
+from page.made_runs import stepped_run, table_run, verdict_of
 
 from irl_gym.claims import into_folder
-from irl_gym.page.compared import policies, rewards, values
+from irl_gym.page.compared import policies, values
 from irl_gym.page.comparison import write_comparison
 from irl_gym.page.episodes import episodes
-from irl_gym.page.proof import certificate, doctor, verdict
+from irl_gym.page.proof import certificate, doctor
 from irl_gym.page.scene import Scene
 from irl_gym.page.slider import lambda_slider
 from irl_gym.page.training import widths
+from irl_gym.page.verdict import policies_table
 from irl_gym.page.worlds import run_places
-from irl_gym.page.written import aligned, percent, state_called
 from irl_gym.scores import score_of
+from irl_gym.written import aligned, percent, state_called
 
 
 @pytest.fixture(scope="module")
@@ -83,12 +84,12 @@ def test_a_healthy_doctor_says_what_was_examined(lake):
 
 def test_the_worst_tie_says_of_what_it_loses(lake):
     told = {**lake.metrics, "reward": {**lake.metrics["reward"], "worst_tie_regret_share": 1.023}}
-    assert "lose 102.3\u00a0% of what the expert has over random" in verdict(replace(lake, metrics=told))["sentence"]
+    assert "lose 102.3\u00a0% of what the expert has over random" in verdict_of(replace(lake, metrics=told))["sentence"]
 
 
 def test_a_score_has_one_form(lake):
     score = score_of(lake.metrics["policies"]["retrained"]["score"])
-    told = verdict(lake)
+    told = verdict_of(lake)
     assert told["figures"][0]["value"] == score and f"a score of {score} and a mean return of" in told["sentence"]
 
 
@@ -164,6 +165,7 @@ def test_no_agent_is_best_across_environments(lake, tmp_path):
 
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(lake):
     told = replace(lake, metrics={**lake.metrics, "reward": {**lake.metrics["reward"], "starc": 0.684, "epic": None}})
-    lead = rewards(told, scene_of(told)).lead
-    assert "Between the two STARC's distance is 0.68, where 0 is a reward that ranks all policies alike" in lead
-    assert "STARC" not in rewards(lake, scene_of(lake)).lead
+    found = policies_table(told.metrics).shown
+    assert ("STARC distance", "0.68") in found["lines"] and "EPIC" not in str(found)
+    assert "STARC distance: between the learned reward and the true one: 0 ranks all policies alike" in found["note"]
+    assert "distance" not in str(policies_table(lake.metrics).shown)

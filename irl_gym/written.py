@@ -1,13 +1,13 @@
-"""How the page writes numbers: few digits, thousands apart, and a word where there is none."""
+"""How numbers are written for people: few digits, thousands apart, and a word where there is none."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from irl_gym.facts import counted as counted
-from irl_gym.intervals import TOO_FEW, Interval, as_interval
+from irl_gym.intervals import TOO_FEW, Interval
 
 MISSING = "not known"
 ROUNDING = 1e-9
@@ -55,11 +55,6 @@ def percent(share: Any) -> str:
     return (
         MISSING if share is None or not math.isfinite(share) else f"{share:.1%}".replace("%", "\u00a0%").replace("-0.0", "0.0")
     )
-
-
-def interval(row: Mapping[str, Any], *keys: str) -> str:
-    """A mean with its 95 % interval, by the keys of estimate and ends; the mean return where none are given."""
-    return with_ends(as_interval(*(row[key] for key in keys or ("mean_return", "return_low", "return_high"))))
 
 
 def with_ends(found: Interval, how: Callable[[Any], str] = number) -> str:

@@ -3,9 +3,10 @@ import json
 import numpy as np
 import pytest
 
+from irl_gym.intervals import as_interval
 from irl_gym.page.document import embedded_json
 from irl_gym.page.panels import plotted, telling
-from irl_gym.page.written import interval, listed, number, percent, seconds, sentence_of, sum_of
+from irl_gym.written import listed, number, percent, seconds, sentence_of, sum_of, with_ends
 
 
 @pytest.mark.parametrize(
@@ -36,8 +37,8 @@ def test_seconds_are_read_at_a_glance(value, text):
 
 
 def test_interval_has_both_ends():
-    assert interval({"mean_return": 0.5, "return_low": 0.4, "return_high": 0.6}) == "0.5 (0.4 to 0.6)"
-    assert interval({"mean_return": 0.0, "return_low": None, "return_high": None}) == "0 (too few to say)"
+    assert with_ends(as_interval(0.5, 0.4, 0.6)) == "0.5 (0.4 to 0.6)"
+    assert with_ends(as_interval(0.0, None, None)) == "0 (too few to say)"
 
 
 def test_listed_makes_nan_none_and_shortens():

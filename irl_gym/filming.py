@@ -8,9 +8,9 @@ import contextlib
 import io
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -33,16 +33,9 @@ MOST_STEPS = 1000
 """Steps after which a film is cut."""
 SIZES = ((320, 80), (320, 55), (240, 50), (160, 45), (96, 40))
 """Pixels of the longer side, and webp's quality: tried in this order."""
-
-
-class Pays(Protocol):
-    """What a learned reward pays."""
-
-    def __call__(
-        self, observations: Sequence[Any], actions: Sequence[int], *, terminated: bool
-    ) -> tuple[list[int | None], np.ndarray]:
-        """Rows of T + 1 observations, None where there is none, and (T,) what is paid for the steps, NaN where unknown."""
-        ...
+Pays = Callable[..., tuple[list[int | None], np.ndarray]]
+"""T + 1 observations, T actions and whether the episode `terminated` -> rows, None where there is none, and (T,) what a learned
+reward pays, NaN where that is not known."""
 
 
 @dataclass

@@ -11,6 +11,7 @@ from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import AT_STAKE, told_record
+from irl_gym.page.absent import TABLE
 from irl_gym.page.sections import Section
 from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
 from irl_gym.runs import Run
@@ -265,18 +266,12 @@ def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def table_facts(run: Run) -> Section:
+def table_facts(told_of_table: Mapping[str, Any], actions: tuple[str, ...]) -> Section:
     """How big the table is, and how far it is to be trusted."""
-    told = run.metrics.get("table")
-    if told is None:
-        lead = (
-            "There is no table: the environment was stepped, and everything is estimated from episodes. So this page has no "
-            "values, policies, lambda slider and feasible widths state by state."
-        )
-        return Section("table", "The table", lead)
+    told = told_of_table
     lines = [
         ("States", f"{told['states']:,}, of which episodes visit {told['reachable']:,}"),
-        ("Actions", f"{told['actions']:,}: {', '.join(run.actions[:12])}"),
+        ("Actions", f"{told['actions']:,}: {', '.join(actions[:12])}"),
         ("Transitions", f"{told['transitions']:,}"),
     ]
     if "exact" in told:
@@ -294,4 +289,4 @@ def table_facts(run: Run) -> Section:
         lines.append(
             ("Checked", f"{check['steps']:,} steps of the environment, no contradiction; p = {number(check['p_value'], 2)}")
         )
-    return Section("table", "The table", "What the environment was turned into.", (), "facts", {"lines": lines})
+    return Section(*TABLE, "What the environment was turned into.", (), "facts", {"lines": lines})

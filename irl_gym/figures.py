@@ -1,6 +1,6 @@
 """The figures of a run: rewards, values and policies, returns, and the learning curve, each drawn where what it shows is there.
 
-Parts are those of `irl_gym.loop.Loop`. Axes: S states, A actions.
+Parts are those of `irl_gym.loop.Loop.sources`. Axes: S states, A actions.
 """
 
 from collections.abc import Mapping
@@ -41,16 +41,9 @@ def learning_curve(folder: Path, path: Path, curve: Curve, judged: Mapping[str, 
 
 
 def of_table(
-    folder: Path,
-    path: Path,
-    table: Tabulation,
-    tabular: TabularReward,
-    expert: np.ndarray,
-    agent: np.ndarray,
-    layout: GridLayout | None,
-    env: gym.Env,
-    env_id: str | None,
-) -> dict[str, Any]:
+    folder: Path, path: Path, table: Tabulation, tabular: TabularReward, expert: np.ndarray, agent: np.ndarray,
+    layout: GridLayout | None, env: gym.Env, env_id: str | None,
+) -> dict[str, Any]:  # fmt: skip
     """Rewards, values and policies state by state."""
     with understood(path):
         usual = usual_observation(table.states)
@@ -92,12 +85,9 @@ def _pictures(
 
 
 def _of_plane(
-    cells: Cells,
-    mdp: TabularMDP,
-    rewards: tuple[TabularReward, TabularReward],
-    values: list[np.ndarray],
+    cells: Cells, mdp: TabularMDP, rewards: tuple[TabularReward, TabularReward], values: list[np.ndarray],
     policies: dict[str, np.ndarray],
-) -> dict[str, plotting.Figure]:
+) -> dict[str, plotting.Figure]:  # fmt: skip
     """The same over the two coordinates of a grid of cells."""
     paid = [reward.values if reward.on_states else reward.values.max(axis=1) for reward in rewards]
     names = [

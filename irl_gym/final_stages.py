@@ -3,7 +3,7 @@
 record      films/, grid.json, metrics.csv: episodes to watch, where the states lie, the figures for other tools
 ambiguity   ambiguity.npz, diagnosis.json: how far the reward is left open, and what the doctor says of it
 report      report.html, from what is on disk alone
-Parts are those of `irl_gym.loop.Loop`, and the experiment's fields.
+Parts are those of `irl_gym.loop.Loop.sources`.
 """
 
 import json
@@ -43,17 +43,9 @@ MOST_STEPS = 2_500
 
 
 def films(
-    folder: Path,
-    world: World,
-    env: gym.Env,
-    env_id: str | None,
-    given: list[Episode] | None,
-    demonstrations: list[Episode],
-    expert: Any,
-    agent: Any,
-    learned: TabularReward | LinearReward,
-    seed: int,
-) -> dict[str, Any]:
+    folder: Path, world: World, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
+    expert: Any, agent: Any, learned: TabularReward | LinearReward, seed: int,
+) -> dict[str, Any]:  # fmt: skip
     """An episode of the expert, the first of a dataset where one was given, and one of the agent; why some have no pictures."""
     (folder / "films").mkdir()
     first = world.chooser(expert, seed) if given is None else (seen_parts(demonstrations) or demonstrations)[0]
@@ -79,18 +71,10 @@ def figures_as_csv(folder: Path, judged: Mapping[str, Any], env_id: str | None, 
 
 
 def diagnosis(
-    folder: Path,
-    path: Path,
-    mdp: TabularMDP | None,
-    known_expert: Any,
-    learned: TabularReward | LinearReward,
-    tabular: TabularReward | None,
-    true: TabularReward | None,
-    certificate: Mapping[str, Any],
-    solved: Mapping[str, Any],
-    shaping: bool,
-    judged: Mapping[str, Any],
-) -> dict[str, Any]:
+    folder: Path, path: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward,
+    tabular: TabularReward | None, true: TabularReward | None, certificate: Mapping[str, Any], solved: Mapping[str, Any],
+    shaping: bool, judged: Mapping[str, Any],
+) -> dict[str, Any]:  # fmt: skip
     """What the doctor says. An examination that fails does not undo the run: the record says why."""
     try:
         with understood(path):  # a run that is continued may have been changed meanwhile

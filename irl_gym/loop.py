@@ -33,10 +33,8 @@ from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment, as_config
-from irl_gym.layouts import GridLayout
 from irl_gym.learners.base import takes
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
-from irl_gym.mdp import TabularMDP
 from irl_gym.needs import missing, part, supplied
 from irl_gym.places import place_of
 from irl_gym.planners import Planner
@@ -44,9 +42,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder, read_json
 from irl_gym.simulator import Simulator
 from irl_gym.stages import OnProgress
-from irl_gym.states import States
 from irl_gym.table_files import TABLE
-from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import World
 
 Make = Callable[..., Mapping[str, Any]]
@@ -74,8 +70,8 @@ MAKERS: dict[str, tuple[Make, ...]] = dict(
 class Loop:
     """One run: the stages, in order, over a folder. Whoever makes it holds the folder (`own_files.held`).
 
-    It supplies what stages need (`needs`): its fields and properties, and the experiment's fields. What a stage left is read
-    from the folder, so that a run that continues sees what one in a single go sees.
+    It supplies what stages need (`needs`): its fields and properties, and those of the world and the experiment. What a stage
+    left is read from the folder, so that a run that continues sees what one in a single go sees.
 
     Args:
         experiment: what to do.
@@ -146,9 +142,14 @@ class Loop:
         """Make a stage in a folder; what is recorded of it."""
         record: dict[str, Any] = {}
         for make in MAKERS[name]:
-            if missing(make, self, self.experiment, folder=folder) is None:
-                record |= supplied(make, self, self.experiment, folder=folder)
+            if missing(make, *self.sources, folder=folder) is None:
+                record |= supplied(make, *self.sources, folder=folder)
         return record
+
+    @property
+    def sources(self) -> tuple[Any, ...]:
+        """Who supplies what stages need, in this order."""
+        return self, self.world, self.experiment
 
     # What stages need: first what there is from the start, then what they left.
 
@@ -156,31 +157,6 @@ class Loop:
     def env_id(self) -> str | None:
         """Of the environment."""
         return self.experiment.env_id or (None if self.env.spec is None else self.env.spec.id)
-
-    @property
-    def table(self) -> Tabulation | None:
-        """The table; None, as all that follows from it, where the environment is stepped."""
-        return self.world.table
-
-    @property
-    def mdp(self) -> TabularMDP | None:
-        """P, gamma and d0 of the table."""
-        return self.world.mdp
-
-    @property
-    def states(self) -> States | None:
-        """Observations and rows of the table."""
-        return self.world.states
-
-    @property
-    def true(self) -> TabularReward | None:
-        """The true reward in the table."""
-        return self.world.true
-
-    @property
-    def layout(self) -> GridLayout | None:
-        """The map of the table."""
-        return self.world.layout
 
     @property
     def teacher(self) -> Planner | None:
@@ -237,7 +213,7 @@ class Loop:
     def lesson(self) -> Mapping[str, Any]:
         """What the learner takes, by name."""
         learner = self.experiment.learner
-        return {name: part(name, self, self.experiment, asked_by=type(learner).__name__) for name in takes(learner)}
+        return {name: part(name, *self.sources, asked_by=type(learner).__name__) for name in takes(learner)}
 
     @cached_property
     def solved(self) -> Mapping[str, Any]:

@@ -84,7 +84,7 @@ def recover_and_retrain(
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-        metrics = _read_again(loop.path, loop.table) if stages["report"].get("kept") else loop.judged
+        metrics = _read_again(loop.path, loop.world.table) if stages["report"].get("kept") else loop.judged
     return Report(loop.path, metrics, loop.certificate, stages, experiment.to_json(), _shown(loop.env))
 
 

@@ -1,7 +1,7 @@
 """The stages of a run up to the judgement: each writes into a folder what it makes of what it needs, and returns its record.
 
 A stage is one or several functions, of which those are called whose needs are there (`needs`): an expert is planned where one
-may be, and read from the dataset where there is one. Parts are those of `irl_gym.loop.Loop`, and the experiment's fields.
+may be, and read from the dataset where there is one. Parts are those of `irl_gym.loop.Loop.sources`.
 """
 
 from collections.abc import Callable, Mapping
@@ -49,12 +49,8 @@ def recorded_expert(folder: Path, dataset: str, seen: EmpiricalPolicy | None) ->
 
 
 def recorded_episodes(
-    dataset: str,
-    dataset_root: str | None,
-    after_end: AfterEnd,
-    given: list[Episode],
-    demonstrations: list[Episode],
-) -> dict[str, Any]:
+    dataset: str, dataset_root: str | None, after_end: AfterEnd, given: list[Episode], demonstrations: list[Episode],
+) -> dict[str, Any]:  # fmt: skip
     """The episodes of a dataset, which stays where it is."""
     taken = sum(map(len, demonstrations))
     recorded = {"dataset_id": dataset, "episodes": len(demonstrations), "steps_recorded": taken}
@@ -63,17 +59,9 @@ def recorded_episodes(
 
 
 def played_episodes(
-    folder: Path,
-    teacher: Planner,
-    env: gym.Env,
-    env_id: str,
-    world: World,
-    expert: Any,
-    gamma: float,
-    episodes: int,
-    eval_episodes: int,
-    seed: int,
-) -> dict[str, Any]:
+    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: World, expert: Any, gamma: float, episodes: int,
+    eval_episodes: int, seed: int,
+) -> dict[str, Any]:  # fmt: skip
     """Episodes of an expert that was planned, as a Minari dataset."""
     recorded = world.episodes(expert, episodes, seed)
     chance = world.episodes(world.random, eval_episodes, seed)
@@ -110,14 +98,9 @@ def recovered_reward(folder: Path, learner: Learner, lesson: Mapping[str, Any]) 
 
 
 def retrained_agent(
-    folder: Path,
-    retrainer: Planner,
-    world: World,
-    learned: TabularReward | LinearReward,
-    shaping: bool,
-    certificate: Mapping[str, Any],
-    report_progress: OnProgress,
-) -> dict[str, Any]:
+    folder: Path, retrainer: Planner, world: World, learned: TabularReward | LinearReward, shaping: bool,
+    certificate: Mapping[str, Any], report_progress: OnProgress,
+) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
     paid = world.paid(learned, shaped=shaping, margin_cap=certificate.get("margin_cap"))
     glances = Glances(world, _share(report_progress, "agent", retrainer))

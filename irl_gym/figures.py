@@ -65,7 +65,7 @@ def _pictures(
     mdp, true = table.mdp, table.reward
     unknown = np.zeros(mdp.n_states, dtype=bool)
     if expert.ndim == 2:  # read from data: where nothing is known, random
-        known = ~np.isnan(expert).any(axis=1)
+        known = np.logical_not(np.isnan(expert).any(axis=1))
         unknown = ~known
         expert = np.where(known[:, None], expert, 1 / mdp.n_actions)
         taken = (expert > 0) & known[:, None]

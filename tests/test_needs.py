@@ -100,3 +100,19 @@ def test_a_learner_takes_parts_of_the_loop(learner):
 
 def test_what_only_a_table_has_is_known_of_where_there_is_none():
     assert {"table", "mdp", "states", "true", "layout"} <= set(parts(TableWorld)) & set(parts(SteppedWorld))
+
+
+@dataclass(frozen=True)
+class Curious:
+    """A learner that takes what there cannot be."""
+
+    takes = ("mdp", "gossip")
+
+    def fit(self, world, expert, /):
+        raise AssertionError("nothing can be given to it")
+
+
+def test_a_learner_that_takes_what_there_cannot_be_is_told_what_there_can(tmp_path):
+    loop = Loop(Experiment("FrozenLake-v1", 0.9, learner=Curious()), tmp_path / "run")
+    with pytest.raises(InvalidParameter, match=r"Curious needs 'gossip'.*There can be .*known_expert"):
+        _ = loop.lesson

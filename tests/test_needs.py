@@ -18,7 +18,8 @@ from irl_gym.page.absent import LACKS
 from irl_gym.page.contents import Contents
 from irl_gym.page.report import SECTIONS, facts
 from irl_gym.runs import Run
-from irl_gym.worlds import SteppedWorld, TableWorld
+from irl_gym.table_world import TableWorld
+from irl_gym.worlds import SteppedWorld
 
 
 @dataclass

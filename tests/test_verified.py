@@ -13,11 +13,11 @@ from irl_gym.errors import RunIncomplete
 from irl_gym.linear_reward import load_reward
 from irl_gym.page.proof import certificate, verdict
 from irl_gym.pipeline import recover_and_retrain
+from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run
 from irl_gym.verified import again, claims, recomputed, with_again
-from irl_gym.worlds import load_actions
 
 
 @pytest.fixture(scope="module")

@@ -17,11 +17,12 @@ from irl_gym.linear_reward import LinearReward
 from irl_gym.metrics import policy_value
 from irl_gym.noise import Noisy
 from irl_gym.planners import FOR_CONTROL, SB3, Agent, ValueIteration
-from irl_gym.policies import as_distribution
+from irl_gym.policies import as_distribution, load_actions
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import RunFolder
+from irl_gym.table_world import DEFAULT_EPISODE_STEPS, TableWorld, step_limit
 from irl_gym.tabulate import tabulate
-from irl_gym.worlds import DEFAULT_EPISODE_STEPS, SteppedWorld, TableWorld, discounted_mean, load_actions, step_limit
+from irl_gym.worlds import SteppedWorld, discounted_mean
 
 SHORT = SB3(total_timesteps=64, hyperparameters={"n_steps": 8, "batch_size": 16})
 POLE = LinearReward(np.ones(1), Functions(lambda seen: np.ones((len(seen), 1)), 1))

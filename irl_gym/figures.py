@@ -33,7 +33,9 @@ RETURNS = 100
 
 
 def learning_curve(folder: Path, path: Path, curve: Curve, judged: Mapping[str, Any]) -> dict[str, Any]:
-    """What the agent was worth as it trained, between random actions and the expert."""
+    """What the agent was worth as it trained, between random actions and the expert; exact planning has no curve."""
+    if not curve.steps.size:
+        return {}
     with understood(path):  # a run that is continued may have been changed meanwhile
         levels = {name: judged["policies"][name]["value"] for name in ("expert", "random")}
     drawn = {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}

@@ -246,10 +246,9 @@ class Loop:
         return self.world.load(self.folder, "agent")
 
     @cached_property
-    def curve(self) -> Curve | None:
-        """What the agent was worth as it trained; None where it was planned exactly."""
-        found = self.folder.load("learning_curve.csv", read_curve)
-        return found if found.steps.size else None
+    def curve(self) -> Curve:
+        """What the agent was worth as it trained; without points where it was planned exactly."""
+        return self.folder.load("learning_curve.csv", read_curve)
 
     @cached_property
     def judgement(self) -> Mapping[str, Any]:

@@ -56,6 +56,7 @@ class SteppedWorld:
     states: ClassVar[None] = None
     true: ClassVar[None] = None
     layout: ClassVar[None] = None
+    horizon: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         check_steppable(self.env)

@@ -100,7 +100,7 @@ def test_a_learner_takes_parts_of_the_loop(learner):
 
 
 def test_what_only_a_table_has_is_known_of_where_there_is_none():
-    assert {"table", "mdp", "states", "true", "layout"} <= set(parts(TableWorld)) & set(parts(SteppedWorld))
+    assert {"table", "mdp", "states", "true", "layout", "horizon"} <= set(parts(TableWorld)) & set(parts(SteppedWorld))
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,10 @@ from irl_gym.noise import Noisy, checked_epsilon, noisy
 from irl_gym.planners import SB3, Agent, load_agent, tabular_actions
 from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.states import StateIndex
+from irl_gym.table_world import TableWorld, step_limit
 from irl_gym.tabulate import tabulate
 from irl_gym.tabulation import Tabulation
-from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
+from irl_gym.worlds import SteppedWorld
 
 TRAINED: dict[str, PlannerName] = {"ppo": "ppo", "dqn": "dqn", "a2c": "a2c"}
 NAMED = ("value-iteration", *TRAINED, "random")

@@ -1,7 +1,11 @@
-"""The figures of a run: which data of the loop go into which picture."""
+"""The figures of a run: rewards, values and policies, returns, and the learning curve, each drawn where what it shows is there.
 
+Parts are those of `irl_gym.loop.Loop.sources`. Axes: S states, A actions.
+"""
+
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -9,10 +13,10 @@ import numpy as np
 from irl_gym import plotting
 from irl_gym.cell_maps import draw_actions, draw_planes
 from irl_gym.cells import Cells
-from irl_gym.curves import read_curve
-from irl_gym.demonstrations import seen_parts
+from irl_gym.curves import Curve
+from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.dynamic_programming import evaluate_policy
-from irl_gym.layouts import GridLayout, grid_layout
+from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward
 from irl_gym.listed_states import usual_observation
 from irl_gym.mdp import TabularMDP
@@ -21,45 +25,49 @@ from irl_gym.names import Names, action_names, state_name
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
 from irl_gym.run_reader import understood
-from irl_gym.states import StateIndex
-from irl_gym.worlds import SteppedWorld, TableWorld
-
-if TYPE_CHECKING:
-    from irl_gym.loop import Loop
+from irl_gym.tabulation import Tabulation
+from irl_gym.worlds import World
 
 RETURNS = 100
 """Episodes of each policy in the figure of returns."""
 
 
-def draw(loop: "Loop", folder: Path) -> None:
-    """Draw rewards, values, policies and the learning curve as PNG; where there is no table, returns and the curve."""
-    with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
-        levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
-        curve = loop.folder.load("learning_curve.csv", read_curve)
-        pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else {}
-    if isinstance(loop.world, SteppedWorld):  # not in there: what the environment raises is no fault of the files
-        pictures = _of_steps(loop, loop.world)
-    if curve.steps.size:  # exact planning has none
-        pictures["learning_curve.png"] = plotting.draw_learning_curve(
-            {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}, **levels
-        )
+def learning_curve(folder: Path, path: Path, curve: Curve, judged: Mapping[str, Any]) -> dict[str, Any]:
+    """What the agent was worth as it trained, between random actions and the expert; exact planning has no curve."""
+    if not curve.steps.size:
+        return {}
+    with understood(path):  # a run that is continued may have been changed meanwhile
+        levels = {name: judged["policies"][name]["value"] for name in ("expert", "random")}
+    drawn = {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}
+    return _kept(folder, {"learning_curve.png": plotting.draw_learning_curve(drawn, **levels)})
+
+
+def of_table(
+    folder: Path, path: Path, table: Tabulation, tabular: TabularReward, expert: np.ndarray, agent: np.ndarray,
+    layout: GridLayout | None, env: gym.Env, env_id: str | None,
+) -> dict[str, Any]:  # fmt: skip
+    """Rewards, values and policies state by state."""
+    with understood(path):
+        usual = usual_observation(table.states)
+        names = Names(action_names(env), lambda row: state_name(env_id, table.states.decode(row), None, usual))
+        pictures = _pictures(table, tabular, expert, agent, layout, names)
+    return _kept(folder, pictures)
+
+
+def _kept(folder: Path, pictures: Mapping[str, plotting.Figure]) -> dict[str, Any]:
+    (folder / "figures").mkdir(exist_ok=True)
     for name, figure in pictures.items():
-        plotting.save_figure(figure, folder / name)
+        plotting.save_figure(figure, folder / "figures" / name)
+    return {}
 
 
-def layout_of(env: gym.Env, world: TableWorld) -> GridLayout | None:
-    """The map, where the table is exact and its rows are the cells; not where only some cells are listed."""
-    exact = world.table.evidence.exact and isinstance(world.table.states, StateIndex)
-    return grid_layout(env, world.table.mdp) if exact else None
-
-
-def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
-    table = world.table
-    mdp, true, learned = table.mdp, table.reward, world.tabular(loop.learned)
-    layout = layout_of(loop.env, world)
-    expert, unknown = loop.expert, np.zeros(mdp.n_states, dtype=bool)
+def _pictures(
+    table: Tabulation, learned: TabularReward, expert: np.ndarray, agent: np.ndarray, layout: GridLayout | None, names: Names
+) -> dict[str, plotting.Figure]:
+    mdp, true = table.mdp, table.reward
+    unknown = np.zeros(mdp.n_states, dtype=bool)
     if expert.ndim == 2:  # read from data: where nothing is known, random
-        known = ~np.isnan(expert).any(axis=1)
+        known = np.logical_not(np.isnan(expert).any(axis=1))
         unknown = ~known
         expert = np.where(known[:, None], expert, 1 / mdp.n_actions)
         taken = (expert > 0) & known[:, None]
@@ -69,25 +77,19 @@ def _of_table(loop: "Loop", world: TableWorld) -> dict[str, plotting.Figure]:
     values = [np.where(unknown & ~mdp.terminal, np.nan, V) for V in values]  # nothing is known of the expert there
     if isinstance(table.states, Cells) and len(table.states.shape) == 2:
         told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)
-        return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": loop.agent})
-    agent = as_distribution(loop.agent, mdp.n_states, mdp.n_actions)
-    optimal = optimal_actions(mdp, true)
-    usual = usual_observation(table.states)
-    names = Names(action_names(loop.env), lambda row: state_name(loop.env_id, table.states.decode(row), None, usual))
+        return _of_plane(table.states, mdp, (true, learned), values, {"Expert": told, "Retrained agent": agent})
+    retrained, optimal = as_distribution(agent, mdp.n_states, mdp.n_actions), optimal_actions(mdp, true)
     return {
         "rewards.png": plotting.draw_rewards(layout, true.values, learned.values, mdp, names),
         "values.png": plotting.draw_values(layout, values[0], values[1], mdp, names),
-        "policies.png": plotting.draw_policies(layout, taken, agent, optimal, mdp, names),
+        "policies.png": plotting.draw_policies(layout, taken, retrained, optimal, mdp, names),
     }
 
 
 def _of_plane(
-    cells: Cells,
-    mdp: TabularMDP,
-    rewards: tuple[TabularReward, TabularReward],
-    values: list[np.ndarray],
+    cells: Cells, mdp: TabularMDP, rewards: tuple[TabularReward, TabularReward], values: list[np.ndarray],
     policies: dict[str, np.ndarray],
-) -> dict[str, plotting.Figure]:
+) -> dict[str, plotting.Figure]:  # fmt: skip
     """The same over the two coordinates of a grid of cells."""
     paid = [reward.values if reward.on_states else reward.values.max(axis=1) for reward in rewards]
     names = [
@@ -102,19 +104,18 @@ def _of_plane(
     }
 
 
-def _of_steps(loop: "Loop", world: SteppedWorld) -> dict[str, plotting.Figure]:
-    """The recovered reward's return of episodes against the true one's."""
-    reward = loop.learned
-    if not isinstance(reward, LinearReward):
-        return {}
-    seed = loop.experiment.seed + 31_337
+def returns(
+    folder: Path, weights: LinearReward, demonstrations: list[Episode], agent: Any, world: World, seed: int
+) -> dict[str, Any]:
+    """The recovered reward's return of episodes against the true one's, where there is no table."""
+    seed += 31_337
     episodes = {
-        "expert": seen_parts(loop.demonstrations)[:RETURNS],
+        "expert": seen_parts(demonstrations)[:RETURNS],
         "random": world.episodes(world.random, RETURNS, seed),
-        "retrained": world.episodes(loop.agent, RETURNS, seed + RETURNS),
+        "retrained": world.episodes(agent, RETURNS, seed + RETURNS),
     }
     points = {
-        name: np.array([[one.total_reward, reward.of(one.observations)[1:].sum()] for one in some])
+        name: np.array([[one.total_reward, weights.of(one.observations)[1:].sum()] for one in some])
         for name, some in episodes.items()
     }
-    return {"returns.png": plotting.draw_returns(points)}
+    return _kept(folder, {"returns.png": plotting.draw_returns(points)})

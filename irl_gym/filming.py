@@ -8,9 +8,9 @@ import contextlib
 import io
 import os
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -18,20 +18,14 @@ from gymnasium import spaces
 from PIL import Image, features
 
 from irl_gym.closing import close
-from irl_gym.demonstrations import Episode, seen_parts
+from irl_gym.demonstrations import Episode
 from irl_gym.errors import UnknownObservation
-from irl_gym.features import batch_of_one, take
+from irl_gym.features import take
 from irl_gym.films import MOST_BYTES, Film, Moment
 from irl_gym.layouts import grid_shape
-from irl_gym.linear_reward import LinearReward
 from irl_gym.names import action_names, state_name
-from irl_gym.noise import Noisy
-from irl_gym.policies import TabularPolicy, as_distribution
 from irl_gym.rollouts import maker_of
-from irl_gym.worlds import TableWorld, step_limit
-
-if TYPE_CHECKING:
-    from irl_gym.loop import Loop
+from irl_gym.table_world import Choose, step_limit
 
 MOST_FRAMES = 60
 """Pictures of a film."""
@@ -39,9 +33,9 @@ MOST_STEPS = 1000
 """Steps after which a film is cut."""
 SIZES = ((320, 80), (320, 55), (240, 50), (160, 45), (96, 40))
 """Pixels of the longer side, and webp's quality: tried in this order."""
-
-Choose = Callable[[Any, int], int]
-"""An observation and the time -> an action, counted from 0."""
+Pays = Callable[..., tuple[list[int | None], np.ndarray]]
+"""T + 1 observations, T actions and whether the episode `terminated` -> rows, None where there is none, and (T,) what a learned
+reward pays, NaN where that is not known."""
 
 
 @dataclass
@@ -56,26 +50,29 @@ class _Take:
     without: str | None = None
 
 
-def film(loop: "Loop", name: str) -> Film:
-    """Film an episode of the expert or of the agent; where the expert is known by a dataset only, the dataset's first.
+def film(name: str, env: gym.Env, shown: Choose | Episode, seed: int | None, pays: Pays, env_id: str | None) -> Film:
+    """Film an episode that is run, or that was recorded.
 
     Args:
-        loop: a run whose agent is trained.
-        name: "expert" or "agent".
+        name: such as "expert" or "agent".
+        env: a copy of it is filmed.
+        shown: who acts; or the episode, which is run again for its pictures.
+        seed: of the reset, where it is run.
+        pays: what the learned reward pays.
+        env_id: the environment's, by which states are called.
     """
-    given = name == "expert" and loop.experiment.dataset is not None
-    seed = loop.experiment.seed
-    env, without = _stage(loop.env)
+    stage, without = _stage(env)
     try:
-        if given:
-            episode = (seen_parts(loop.demonstrations) or loop.demonstrations)[0]
-            made, seed = _replayed(env, episode, without), episode.seed
+        if isinstance(shown, Episode):
+            made, seed = _replayed(stage, shown, without), shown.seed
         else:
-            choose = _chooser(loop, loop.expert if name == "expert" else loop.agent, seed)
-            made = _run(env, choose, seed, min(step_limit(loop.env), MOST_STEPS), without)
+            made = _run(stage, shown, seed, min(step_limit(env), MOST_STEPS), without)
     finally:
-        close(env)
-    return _developed(loop, name, seed, made)
+        close(stage)
+    rows, learned = pays(made.observations, made.actions, terminated=made.ends == "terminated")
+    columns = columns_of(env)
+    texts = [state_name(env_id, one, columns) for one in made.observations]
+    return _developed(name, seed, made, texts, rows, learned, action_names(env))
 
 
 def _stage(env: gym.Env) -> tuple[gym.Env, str | None]:
@@ -114,17 +111,6 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'no message'}"
 
 
-def _chooser(loop: "Loop", policy: Any, seed: int) -> Choose:
-    """What acts, as in the episodes that judge it."""
-    world = loop.world
-    if isinstance(world, TableWorld):
-        mdp = world.table.mdp
-        actor: Any = TabularPolicy(as_distribution(policy, mdp.n_states, mdp.n_actions), world.table.states, seed)
-        return lambda observation, _: int(actor.predict(observation)[0])
-    actor = replace(policy, seed=seed) if isinstance(policy, Noisy) else policy
-    return lambda observation, _: int(np.asarray(actor.predict(observation, deterministic=True)[0]))
-
-
 def _run(env: gym.Env, choose: Choose, seed: int | None, most: int, without: str | None) -> _Take:
     """Run one episode."""
     first = int(getattr(env.action_space, "start", 0))
@@ -132,7 +118,7 @@ def _run(env: gym.Env, choose: Choose, seed: int | None, most: int, without: str
     camera.draw(made, 0)
     for time in range(most):
         try:
-            action = choose(made.observations[-1], time)
+            action = choose(made.observations[-1])
         except UnknownObservation:  # a table that was sampled may not know it
             break
         observation, reward, terminated, truncated, _ = env.step(action + first)
@@ -181,7 +167,8 @@ def _replayed(env: gym.Env, episode: Episode, without: str | None) -> _Take:
     if without is None and episode.seed is None:
         without = "the dataset does not say with which seed the episode was recorded"
     if without is None:
-        again = _run(env, lambda _, time: given.actions[time], episode.seed, n, None)
+        actions = iter(given.actions)
+        again = _run(env, lambda _: next(actions), episode.seed, n, None)
         same = len(again.observations) == len(shown) and all(map(_equal, again.observations, shown))
         if same:
             given.pictures, without = again.pictures, again.without
@@ -199,12 +186,17 @@ def _equal(one: Any, other: Any) -> bool:
     return np.array_equal(one, other)
 
 
-def _developed(loop: "Loop", name: str, seed: int | None, made: _Take) -> Film:
+def _developed(
+    name: str,
+    seed: int | None,
+    made: _Take,
+    texts: list[str],
+    rows: list[int | None],
+    learned: np.ndarray,
+    actions: Sequence[str],
+) -> Film:
     """The film of a take: what each step was paid, and its pictures as files hold them."""
-    rows, learned = _paid(loop, made)
-    actions, columns = action_names(loop.env), columns_of(loop.env)
     numbers, frames, kind = _frames(made)
-    texts = [state_name(loop.env_id, one, columns) for one in made.observations]
     moments = [Moment(texts[0], rows[0], None, None, None, None, 0.0, 0.0, numbers.get(0))]
     totals = zip(np.cumsum(made.rewards).tolist(), np.nancumsum(learned).tolist(), strict=True)
     for time, (true_total, learned_total) in enumerate(totals, 1):
@@ -222,24 +214,6 @@ def columns_of(env: gym.Env) -> int | None:
     """Columns of the map whose cells the observations number; None where they do not."""
     shape, space = grid_shape(env), env.observation_space
     return shape[1] if shape is not None and isinstance(space, spaces.Discrete) and np.prod(shape) == space.n else None
-
-
-def _paid(loop: "Loop", made: _Take) -> tuple[list[int | None], np.ndarray]:
-    """The rows of the moments, None where the table has none, and what the recovered reward pays for steps, NaN if unknown."""
-    world, reward = loop.world, loop.learned
-    if not isinstance(world, TableWorld):
-        if not isinstance(reward, LinearReward):
-            return [None] * len(made.observations), np.full(len(made.actions), np.nan)
-        return [None] * len(made.observations), np.array([reward.of(batch_of_one(one))[0] for one in made.observations[1:]])
-    last = len(made.actions) if made.ends == "terminated" else None
-    rows: list[int | None] = []
-    for time, observation in enumerate(made.observations):
-        try:
-            rows.append(int(world.table.states.encode(observation, terminated=time == last)))
-        except UnknownObservation:  # of a table that was sampled
-            rows.append(None)
-    paid, steps = world.tabular(reward), zip(rows, made.actions, rows[1:], strict=False)
-    return rows, np.array([np.nan if None in (s, t) else float(paid.pay(s, a, t)) for s, a, t in steps])
 
 
 def _frames(made: _Take) -> tuple[dict[int, int], tuple[bytes, ...], str]:

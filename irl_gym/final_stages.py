@@ -3,108 +3,118 @@
 record      films/, grid.json, metrics.csv: episodes to watch, where the states lie, the figures for other tools
 ambiguity   ambiguity.npz, diagnosis.json: how far the reward is left open, and what the doctor says of it
 report      report.html, from what is on disk alone
+Parts are those of `irl_gym.loop.Loop.sources`.
 """
 
 import json
-from dataclasses import replace
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
 from irl_gym.ambiguity.lambda_path import lambda_path
 from irl_gym.ambiguity.widths import feasible_widths
 from irl_gym.certificates import claims_in
+from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnosis import diagnose, weights_of
 from irl_gym.errors import IrlGymError
-from irl_gym.figures import layout_of
 from irl_gym.filming import film
-from irl_gym.learners.finite import FiniteLP
+from irl_gym.layouts import GridLayout
+from irl_gym.learners.base import Learner
+from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
 from irl_gym.page.slider import MOST_PIECES
+from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import write_json
 from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
-from irl_gym.worlds import TableWorld
+from irl_gym.tabulation import Tabulation
+from irl_gym.worlds import World
 
-if TYPE_CHECKING:
-    from irl_gym.loop import Loop
-
-FILMS = ("expert", "agent")
 MOST_STATES = 500
 """States to act in, of a table whose feasible set is examined."""
 MOST_STEPS = 2_500
 """Rewards of steps that are asked about; two programs each."""
 
 
-def record(loop: "Loop", folder: Path) -> dict[str, Any]:
-    """Write films, map and csv; tell which films have no pictures, and why."""
+def films(
+    folder: Path, world: World, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
+    expert: Any, agent: Any, learned: TabularReward | LinearReward, seed: int,
+) -> dict[str, Any]:  # fmt: skip
+    """An episode of the expert, the first of a dataset where one was given, and one of the agent; why some have no pictures."""
     (folder / "films").mkdir()
+    first = world.chooser(expert, seed) if given is None else (seen_parts(demonstrations) or demonstrations)[0]
     without = {}
-    for name in FILMS:
-        made = film(loop, name)
+    for name, shown in {"expert": first, "agent": world.chooser(agent, seed)}.items():
+        made = film(name, env, shown, seed, partial(world.pays, learned), env_id)
         made.save(folder / "films")
         if made.without_frames is not None:
             without[name] = made.without_frames
-    layout = layout_of(loop.env, loop.world) if isinstance(loop.world, TableWorld) else None
-    if layout is not None:
-        write_json(folder / "grid.json", layout.to_json())
-    write_metrics_csv(loop.folder_metrics, folder / "metrics.csv", env=loop.env_id, config=loop.experiment.to_json())
     return {"without_frames": without}
 
 
-def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
-    """Write what the doctor says; for small tables how wide the feasible set is and how the reward depends on lambda.
+def grid(folder: Path, layout: GridLayout) -> dict[str, Any]:
+    """The map."""
+    write_json(folder / "grid.json", layout.to_json())
+    return {}
 
-    Size decides, not time, so that the same seed leaves the same files. An examination that fails does not undo the run:
-    the record says why.
-    """
-    told: dict[str, Any] = {}
+
+def figures_as_csv(folder: Path, judged: Mapping[str, Any], env_id: str | None, config: Mapping[str, Any]) -> dict[str, Any]:
+    """What was measured, for other tools."""
+    write_metrics_csv(judged, folder / "metrics.csv", env=env_id, config=config)
+    return {}
+
+
+def diagnosis(
+    folder: Path, path: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward,
+    tabular: TabularReward | None, true: TabularReward | None, certificate: Mapping[str, Any], solved: Mapping[str, Any],
+    shaping: bool, judged: Mapping[str, Any],
+) -> dict[str, Any]:  # fmt: skip
+    """What the doctor says. An examination that fails does not undo the run: the record says why."""
     try:
-        with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
-            write_json(folder / "diagnosis.json", diagnose(_case(loop)).to_json())
+        with understood(path):  # a run that is continued may have been changed meanwhile
+            case = Case(
+                mdp, known_expert, tabular, claims_in(certificate), solved["status"], solved["stats"], true, shaping, judged,
+                weights_of(learned),
+            )  # fmt: skip
+            write_json(folder / "diagnosis.json", diagnose(case).to_json())
     except IrlGymError as error:
-        told["no_diagnosis"] = f"{type(error).__name__}: {error}"
-    why = _too_much(loop)
+        return {"no_diagnosis": f"{type(error).__name__}: {error}"}
+    return {}
+
+
+def feasible_set(
+    folder: Path, path: Path, learner: Learner, mdp: Any, known_expert: Any, certificate: Mapping[str, Any]
+) -> dict[str, Any]:
+    """For small tables how wide the feasible set is, and how the reward depends on lambda; why not, where it is not examined.
+
+    Size decides, not time, so that the same seed leaves the same files.
+    """
+    why = _too_much(learner, mdp)
     if why is not None:
-        return told | {"no_ambiguity": why}
-    arrays = {}
-    assert isinstance(loop.world, TableWorld)  # or there is too much
+        return {"no_ambiguity": why}
+    told, arrays = {}, {}
     for name, examine in (("widths", _widths), ("path", _path)):
         try:
-            with understood(loop.folder.path):
-                arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
+            with understood(path):
+                found = examine(learner, mdp, known_expert, certificate)
+            arrays |= {f"{name}.{key}": value for key, value in found.items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
     np.savez(folder / "ambiguity.npz", **arrays)
     return told
 
 
-def _case(loop: "Loop") -> Case:
-    """The evidence that the doctor works on, of a table or, without one, of the certificate alone."""
-    made = loop.stage("reward")
-    without = Case(
-        claims=claims_in(loop.certificate), status=made["status"], stats=made["stats"], judged=loop.folder_metrics,
-        weights=weights_of(loop.learned),
-    )  # fmt: skip
-    if not isinstance(loop.world, TableWorld):
-        return without
-    table = loop.world.table
-    return replace(
-        without, mdp=table.mdp, expert=loop.known_expert, reward=loop.world.tabular(loop.learned), true=table.reward,
-        shaped=loop.shaped,
-    )  # fmt: skip
-
-
-def _too_much(loop: "Loop") -> str | None:
+def _too_much(learner: Any, mdp: TabularMDP) -> str | None:
     """Why the feasible set is not examined; None where it is."""
-    learner, world = loop.experiment.learner, loop.world
-    if not isinstance(learner, FiniteLP) or not isinstance(world, TableWorld):
+    if not getattr(learner, "of_feasible_set", False):
         return f"the learner is {type(learner).__name__}: only FiniteLP's reward is examined"
-    mdp = world.table.mdp
     n = int((mdp.reachable & ~mdp.terminal).sum())
     steps = n * mdp.n_actions if learner.reward_on == "state-action" else 0
     if n > MOST_STATES:
@@ -114,21 +124,19 @@ def _too_much(loop: "Loop") -> str | None:
     return None
 
 
-def _widths(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
+def _widths(learner: Any, mdp: TabularMDP, expert: Any, certificate: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """How far apart the rewards of one state can be, or of one step."""
-    learner: Any = loop.experiment.learner
-    found = feasible_widths(mdp, loop.known_expert, r_max=learner.r_max, reward_on=learner.reward_on)
+    found = feasible_widths(mdp, expert, r_max=learner.r_max, reward_on=learner.reward_on)
     return {"low": found.low, "high": found.high, "width": found.width}
 
 
-def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
+def _path(learner: Any, mdp: TabularMDP, expert: Any, certificate: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """How the reward changes with lambda, with the cap on margins that the run's own program had."""
-    learner: Any = loop.experiment.learner
     found = lambda_path(
         mdp,
-        loop.known_expert,
+        expert,
         r_max=learner.r_max,
-        margin_cap=loop.certificate["proof"]["margin_cap"],
+        margin_cap=certificate["proof"]["margin_cap"],
         reward_on=learner.reward_on,
         most_pieces=MOST_PIECES,
     )
@@ -137,9 +145,8 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
     return arrays | {"changes": np.array(json.dumps([change.to_json() for change in found.changes]))}
 
 
-def report(loop: "Loop", folder: Path) -> dict[str, Any]:
-    """Write the page, from what is on disk; the table is at hand."""
-    table = loop.world.table if isinstance(loop.world, TableWorld) else None
-    with understood(loop.folder.path):
-        write_report(read_run(loop.folder.path, table), folder / "report.html")
+def report(folder: Path, path: Path, table: Tabulation | None) -> dict[str, Any]:
+    """The page, from what is on disk; the table is at hand."""
+    with understood(path):
+        write_report(read_run(path, table), folder / "report.html")
     return {}

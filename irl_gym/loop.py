@@ -16,53 +16,63 @@ The true reward enters the table, the expert and the judging only; the learning 
 
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
-from irl_gym import figures, final_stages
-from irl_gym.certificates import certificate_of, read_certificate
+from irl_gym import figures, final_stages, stages
+from irl_gym.certificates import read_certificate
 from irl_gym.choices import environment_of
-from irl_gym.claims import claim, record_start, write_environment, write_version
-from irl_gym.curves import read_curve, write_curve
-from irl_gym.datasets import load_minari, read_minari, write_minari
+from irl_gym.claims import STAGES, claim, record_start, write_environment, write_version
+from irl_gym.curves import Curve, read_curve
+from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent, visits
-from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
-from irl_gym.endings import in_table, left_out
-from irl_gym.errors import NotTabular
-from irl_gym.evaluation import evaluate
+from irl_gym.demonstrations import EmpiricalPolicy, Episode
 from irl_gym.experiment import Experiment, as_config
-from irl_gym.given import FromFile
-from irl_gym.glances import Glances
-from irl_gym.learners.base import IRLResult, Learner
-from irl_gym.learners.feature import FeatureLP
-from irl_gym.learners.finite import FiniteLP
-from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.learners.base import takes
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
-from irl_gym.logs import log_scalars, logged
-from irl_gym.minari_files import dataset_name, unkept
+from irl_gym.needs import missing, part, supplied
 from irl_gym.places import place_of
-from irl_gym.planners import SB3, Agent, Planner
-from irl_gym.policies import Policy
+from irl_gym.planners import Planner
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import LOGS, RunFolder, read_json, write_json
-from irl_gym.scorecard import RECORDS, came_about, how_of, scorecard
-from irl_gym.scores import EXPERT, RANDOM, RETRAINED
-from irl_gym.shaping import ExpectedAdvantage, Transform, Unchanged, typical_loss
+from irl_gym.run_folder import RunFolder, read_json
+from irl_gym.scorecard import RECORDS
 from irl_gym.simulator import Simulator
-from irl_gym.table_files import TABLE, keep_table
-from irl_gym.worlds import SteppedWorld, TableWorld
+from irl_gym.stages import OnProgress
+from irl_gym.table_files import TABLE
+from irl_gym.worlds import World
 
-OnProgress = Callable[[str, float], None]
-"""Called with a stage and the share of it that is done, from 0 to 1."""
+Make = Callable[..., Mapping[str, Any]]
+"""Makes something of a stage of what it needs, in a folder, and returns what is recorded of it."""
+MAKERS: dict[str, tuple[Make, ...]] = dict(
+    zip(
+        STAGES,
+        (
+            (stages.planned_expert, stages.recorded_expert),
+            (stages.played_episodes, stages.recorded_episodes),
+            (stages.recovered_reward,),
+            (stages.retrained_agent,),
+            (stages.metrics,),
+            (figures.of_table, figures.returns, figures.learning_curve),
+            (final_stages.films, final_stages.grid, final_stages.figures_as_csv),
+            (final_stages.diagnosis, final_stages.feasible_set),
+            (final_stages.report,),
+        ),
+        strict=True,
+    )
+)
+"""Who makes each stage, in order: all of them whose needs are there."""
 
 
 class Loop:
     """One run: the stages, in order, over a folder. Whoever makes it holds the folder (`own_files.held`).
+
+    It supplies what stages need (`needs`): its fields and properties, and those of the world and the experiment. What a stage
+    left is read from the folder, so that a run that continues sees what one in a single go sees.
 
     Args:
         experiment: what to do.
@@ -78,6 +88,21 @@ class Loop:
         RunConflict: the folder holds another run.
         RunNewer: the folder holds a run of a newer version.
     """
+
+    experiment: Experiment
+    """What to do."""
+    env: gym.Env
+    """The environment."""
+    world: World
+    """Where it is: with a table, or stepped."""
+    folder: RunFolder
+    """The folder of the run."""
+    path: Path
+    """Of the folder."""
+    report_progress: OnProgress
+    """Told how far each stage is."""
+    config: Mapping[str, Any]
+    """The experiment as json."""
 
     def __init__(
         self,
@@ -95,69 +120,106 @@ class Loop:
             experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root,
             start_seeds=experiment.start_seeds, reveal=experiment.reveal, trust_dataset=experiment.trust_dataset,
         )  # fmt: skip
-        path, config = Path(out), experiment.to_json()
+        path, config = self.path, self.config = Path(out), experiment.to_json()
         claim(path, config)
-        self.world: TableWorld | SteppedWorld = place_of(
-            experiment, self.env, path, lambda share: self.report_progress("table", share)
-        )
+        self.world = place_of(experiment, self.env, path, lambda share: self.report_progress("table", share))
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(path, config)
         write_version(path, command)
         write_environment(path, self.env, self.env_id, None if self.env.spec is None else as_config(self.env.spec.kwargs))
         table_kept = (path / TABLE).exists()
-        if isinstance(self.world, TableWorld):
-            keep_table(self.world.table, path)
+        self.world.keep_table(path)
         record_start(path, table_kept=table_kept)
         self.report_progress("table", 1.0)
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""
-        makers = {
-            "expert": self._make_expert,
-            "demonstrations": self._make_demonstrations,
-            "reward": self._make_reward,
-            "agent": self._make_agent,
-            "metrics": self._make_metrics,
-            "figures": self._make_figures,
-            "record": lambda folder: final_stages.record(self, folder),
-            "ambiguity": lambda folder: final_stages.ambiguity(self, folder),
-            "report": lambda folder: final_stages.report(self, folder),
-        }
         self.report_progress(name, 0.0)
-        record = self.folder.run(name, makers[name])
+        record = self.folder.run(name, lambda folder: self._made(name, folder))
         self.report_progress(name, 1.0)
         return record
+
+    def _made(self, name: str, folder: Path) -> dict[str, Any]:
+        """Make a stage in a folder; what is recorded of it."""
+        record: dict[str, Any] = {}
+        for make in MAKERS[name]:
+            if missing(make, *self.sources, folder=folder) is None:
+                record |= supplied(make, *self.sources, folder=folder)
+        return record
+
+    @property
+    def sources(self) -> tuple[Any, ...]:
+        """Who supplies what stages need, in this order."""
+        return self, self.world, self.experiment
+
+    # What stages need: first what there is from the start, then what they left.
 
     @property
     def env_id(self) -> str | None:
         """Of the environment."""
         return self.experiment.env_id or (None if self.env.spec is None else self.env.spec.id)
 
-    # Results of finished stages, read from the folder: so a run that continues sees what one in a single go sees.
+    @property
+    def teacher(self) -> Planner | None:
+        """Who plans the expert; None where its episodes are given."""
+        return (self.experiment.expert or self.world.expert()) if self.experiment.dataset is None else None
+
+    @property
+    def simulator(self) -> Simulator:
+        """The environment, and who solves it for a reward."""
+        solver = self.experiment.inner or self.world.expert()
+        return Simulator(self.env, solver, self.world.gamma, self.world.table, self.world.num_envs)
+
+    @property
+    def retrainer(self) -> Planner:
+        """Who plans for the learned reward, or learns under it."""
+        return self.experiment.retrain or self.world.planner(shaped=self.experiment.shaping)
 
     @cached_property
     def expert(self) -> Any:
         """The expert: (S,) actions or (S, A) of a table, else a policy; None where only its episodes are known."""
-        if self.experiment.dataset is not None and isinstance(self.world, SteppedWorld):
+        return self.world.load(self.folder, "expert") if self.stage("expert")["files"] else None
+
+    @cached_property
+    def given(self) -> list[Episode] | None:
+        """The episodes of a dataset, as they are; None where none was given."""
+        asked = self.experiment
+        if asked.dataset is None:
             return None
-        return self.world.load(self.folder, "expert")
+        return list(read_minari(asked.dataset, env=self.env, root=asked.dataset_root, after_end=asked.after_end))
+
+    @cached_property
+    def demonstrations(self) -> list[Episode]:
+        """The expert's episodes."""
+        if self.given is not None:
+            return self.world.known(self.given, self.experiment.after_end)
+        return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.path / "dataset"))
 
     @cached_property
     def seen(self) -> EmpiricalPolicy | None:
         """What the episodes show of the expert in the table; None where a learner is given its whole policy."""
-        if not self.experiment.from_episodes or not isinstance(self.world, TableWorld):
-            return None
-        return empirical_policy(self.demonstrations, self.world.table.states, self.world.table.mdp.n_actions)
+        return self.world.seen(self.demonstrations) if self.experiment.from_episodes else None
 
     @property
     def known_expert(self) -> Any:
         """What a learner of tables is given of the expert: its policy, or the most frequent actions, NaN where not seen."""
         return self.expert if self.seen is None else most_frequent(self.seen)
 
+    @property
+    def visits(self) -> np.ndarray | None:
+        """(S,) how often the episodes visit each state; None where a learner is given the expert's whole policy."""
+        return None if self.seen is None else visits(self.seen)
+
     @cached_property
-    def agent(self) -> Any:
-        """The retrained agent, deterministic: (S,) actions of a table, else a policy."""
-        return self.world.load(self.folder, "agent")
+    def lesson(self) -> Mapping[str, Any]:
+        """What the learner takes, by name."""
+        learner = self.experiment.learner
+        return {name: part(name, *self.sources, asked_by=type(learner).__name__) for name in takes(learner)}
+
+    @cached_property
+    def solved(self) -> Mapping[str, Any]:
+        """What was recorded as the reward was learned."""
+        return self.stage("reward")
 
     @cached_property
     def learned(self) -> TabularReward | LinearReward:
@@ -165,151 +227,36 @@ class Loop:
         return self.folder.load("reward.npz", load_reward)
 
     @cached_property
-    def demonstrations(self) -> list[Episode]:
-        """The expert's episodes."""
-        asked = self.experiment
-        if asked.dataset is not None:
-            if not isinstance(self.world, TableWorld) or not self.world.table.evidence.exact:
-                return self._given
-            return list(in_table(self._given, self.world.table.mdp, self.world.table.states, asked.after_end))
-        return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.folder.path / "dataset"))
+    def tabular(self) -> TabularReward | None:
+        """The recovered reward in the table."""
+        return self.world.tabular(self.learned)
+
+    @property
+    def weights(self) -> LinearReward | None:
+        """The recovered reward of observations, where there is no table."""
+        return self.world.weights(self.learned)
 
     @cached_property
-    def _given(self) -> list[Episode]:
-        """The episodes of the dataset that was given, as they are."""
-        asked = self.experiment
-        return list(read_minari(str(asked.dataset), env=self.env, root=asked.dataset_root, after_end=asked.after_end))
-
-    @cached_property
-    def certificate(self) -> dict[str, Any]:
+    def certificate(self) -> Mapping[str, Any]:
         """The content of certificate.json."""
         return self.folder.load("certificate.json", read_certificate)
 
     @cached_property
-    def folder_metrics(self) -> dict[str, Any]:
-        """The content of metrics.json."""
-        return self.folder.load("metrics.json", read_json)
+    def agent(self) -> Any:
+        """The retrained agent, deterministic: (S,) actions of a table, else a policy."""
+        return self.world.load(self.folder, "agent")
 
-    def _share(self, stage: str, planner: Planner) -> Callable[[int, Policy], None]:
-        total = max(1, getattr(planner, "total_timesteps", 1))
-        return lambda steps, _: self.report_progress(stage, min(1.0, steps / total))
-
-    def _make_expert(self, folder: Path) -> dict[str, Any]:
-        if self.experiment.dataset is None:
-            planner = self.experiment.expert or self.world.expert()
-            policy = self.world.train(logged(planner, folder / LOGS / "expert"), None, self._share("expert", planner))
-            self.world.keep(policy, folder, "expert", self.experiment.epsilon)
-            made = {"environment_steps": 0, **planner.trained()} if isinstance(planner, FromFile) else _steps(policy)
-            return {"planner": type(planner).__name__, "how": how_of(planner), **made}
-        if self.seen is not None:
-            np.savez(folder / "expert.npz", actions=most_frequent(self.seen))
-            return {"planner": "most frequent action of the dataset", "states_seen": int(self.seen.visited.sum())}
-        return {"planner": "unknown: the dataset's"}
-
-    def _make_demonstrations(self, folder: Path) -> dict[str, Any]:
-        asked = self.experiment
-        if asked.dataset is not None:
-            taken = sum(map(len, self.demonstrations))
-            recorded = {"dataset_id": asked.dataset, "episodes": len(self.demonstrations), "steps_recorded": taken}
-            steps = load_minari(asked.dataset, root=asked.dataset_root).total_steps if asked.after_end == "cut" else None
-            return recorded | left_out(self._given, self.demonstrations, steps)
-        recorded = self.world.episodes(self.expert, asked.episodes, asked.seed)
-        chance = self.world.episodes(self.world.random, asked.eval_episodes, asked.seed)
-        dataset_id = dataset_name(str(asked.env_id))
-        root = folder / "dataset"
-        root.mkdir()
-        lost = unkept(self.env.spec)
-        about = f"Expert demonstrations of {asked.env_id}, gamma {asked.gamma}, seed {asked.seed}."
-        write_minari(
-            recorded, dataset_id, None if lost else self.env, root=root, algorithm=self.stage("expert")["planner"],
-            observation_space=self.env.observation_space, action_space=self.env.action_space,
-            description=f"{about} {lost}" if lost else about,
-            code_permalink="scripts/recover_and_retrain.py of irl_gym",
-            random_return=float(np.mean([episode.total_reward for episode in chance])),
-            expert_return=float(np.mean([episode.total_reward for episode in recorded])),
-        )  # fmt: skip
-        return {
-            "dataset_id": dataset_id,
-            "episodes": len(recorded),
-            "environment_steps": sum(map(len, recorded)),
-            "seed": asked.seed,
-            **({"no_environment": lost} if lost else {}),
-        }
-
-    def _make_reward(self, folder: Path) -> dict[str, Any]:
-        result = self._learn(self.experiment.learner)
-        result.reward.save(folder / "reward.npz")
-        known = (self.world.table, self.known_expert) if isinstance(self.world, TableWorld) else None
-        write_json(folder / "certificate.json", certificate_of(result, known, episodes=self.experiment.from_episodes))
-        return {"learner": type(self.experiment.learner).__name__, **result.record()}
-
-    def _learn(self, learner: Learner) -> IRLResult:
-        """Give a learner what it is of: a table and a policy, or a simulator and episodes."""
-        world = self.world
-        if isinstance(learner, TrajectoryLP):
-            table = world.table if isinstance(world, TableWorld) else None
-            solver = self.experiment.inner or world.expert()
-            result = learner.fit(Simulator(self.env, solver, world.gamma, table, world.num_envs), self.demonstrations)
-            return replace(result, stats={**result.stats, "inner": type(solver).__name__})
-        if not isinstance(world, TableWorld):
-            raise NotTabular(f"{self.env} has no table: expected one for {type(learner).__name__}. Use TrajectoryLP.")
-        if isinstance(learner, FeatureLP):
-            return learner.fit(world.table.mdp, self.known_expert, states=world.table.states)
-        if isinstance(learner, FiniteLP) and self.seen is not None:
-            return learner.fit(world.table.mdp, self.known_expert, visits=visits(self.seen))
-        return learner.fit(world.table.mdp, self.known_expert)
+    @cached_property
+    def curve(self) -> Curve:
+        """What the agent was worth as it trained; without points where it was planned exactly."""
+        return self.folder.load("learning_curve.csv", read_curve)
 
     @property
-    def shaped(self) -> bool:
-        """Is the agent retrained on the expected advantage? That takes a table."""
-        return self.experiment.shaping and isinstance(self.world, TableWorld)
+    def records(self) -> Mapping[str, Mapping[str, Any]]:
+        """What was recorded of the stages that metrics.json tells of."""
+        return {name: self.stage(name) for name in RECORDS}
 
-    def transform(self, reward: TabularReward, mdp: Any) -> Transform:
-        """What is done to the learned reward before retraining; losses count up to the margin cap, or a typical loss."""
-        if not self.shaped:
-            return Unchanged()
-        return ExpectedAdvantage(self.certificate["proof"].get("margin_cap") or typical_loss(reward, mdp))
-
-    def _make_agent(self, folder: Path) -> dict[str, Any]:
-        world, reward = self.world, self.learned
-        planner = self.experiment.retrain or world.planner(shaped=self.shaped)
-        if isinstance(world, TableWorld):
-            plain = world.tabular(reward)
-            reward = self.transform(plain, world.table.mdp).apply(plain, world.table.mdp)
-        glances = Glances(world, self._share("agent", planner))
-        log = folder / LOGS / "retrained"
-        policy = world.train(logged(planner, log), reward, glances.see)
-        world.keep(policy, folder, "agent")
-        curve = glances.curve()
-        write_curve(curve, folder / "learning_curve.csv")
-        if isinstance(planner, SB3):
-            log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
-        return {"planner": type(planner).__name__, "how": how_of(planner), **_steps(policy)}
-
-    def _make_metrics(self, folder: Path) -> dict[str, Any]:
-        asked, world, config = self.experiment, self.world, self.experiment.to_json()
-        table, horizon, learned = None, None, None
-        if isinstance(world, TableWorld):
-            table, horizon, learned = world.table, world.horizon, world.tabular(self.learned)
-        records = {name: self.stage(name) for name in RECORDS}
-        made = {EXPERT: self.expert, RANDOM: world.random, RETRAINED: self.agent}
-        how, given = came_about(config, records), None if asked.dataset is None else self.demonstrations
-        rows, scale = evaluate(
-            {name: (policy, how[name]) for name, policy in made.items()}, world, table, horizon, given=given,
-            episodes_only=asked.from_episodes, episodes=asked.eval_episodes, seed=asked.seed,
-        )  # fmt: skip
-        curve = self.folder.load("learning_curve.csv", read_curve)
-        content = scorecard(config, records, self.certificate, rows, scale, curve, table, horizon, learned)
-        write_json(folder / "metrics.json", content)
-        return {}
-
-    def _make_figures(self, folder: Path) -> dict[str, Any]:
-        made = folder / "figures"
-        made.mkdir()
-        figures.draw(self, made)
-        return {}
-
-
-def _steps(policy: Policy) -> dict[str, int]:
-    """Environment steps that a policy was trained on."""
-    return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0}
+    @cached_property
+    def judged(self) -> Mapping[str, Any]:
+        """The content of metrics.json."""
+        return self.folder.load("metrics.json", read_json)

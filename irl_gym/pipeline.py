@@ -10,12 +10,13 @@ import gymnasium as gym
 
 from irl_gym.claims import STAGES
 from irl_gym.experiment import Experiment
-from irl_gym.loop import Loop, OnProgress
+from irl_gym.loop import Loop
 from irl_gym.own_files import held
 from irl_gym.reveal import Reveal
 from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
-from irl_gym.worlds import TableWorld
+from irl_gym.stages import OnProgress
+from irl_gym.tabulation import Tabulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,15 +84,15 @@ def recover_and_retrain(
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-        found = loop.folder_metrics, loop.certificate
-        metrics, certificate = _read_again(loop) if stages["report"].get("kept") else found
-    return Report(loop.folder.path, metrics, certificate, stages, experiment.to_json(), _shown(loop.env))
+        found = loop.judged, loop.certificate
+        metrics, certificate = _read_again(loop.path, loop.world.table) if stages["report"].get("kept") else found
+    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), _shown(loop.env))
 
 
-def _read_again(loop: Loop) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+def _read_again(path: Path, table: Tabulation | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """The metrics and the certificate of a run that was finished before, which may have been changed since."""
-    with understood(loop.folder.path):
-        run = read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None)
+    with understood(path):
+        run = read_run(path, table)
         return run.metrics, run.certificate
 
 

@@ -19,11 +19,13 @@ from irl_gym.errors import (
     NotTabular,
 )
 from irl_gym.experiment import Experiment
-from irl_gym.learners.trajectory import TrajectoryLP
+from irl_gym.learners.base import takes
+from irl_gym.planners import Planner, ValueIteration
 from irl_gym.table_files import UNDER_WAY, kept_table
+from irl_gym.table_world import TableWorld, step_limit
 from irl_gym.tabulate import tabulate
 from irl_gym.tabulation import Tabulation
-from irl_gym.worlds import SteppedWorld, TableWorld, step_limit
+from irl_gym.worlds import SteppedWorld, World
 
 ON_COMMAND_LINE: dict[type[Exception], str] = {
     HiddenState: "(On the command line: --start-seeds 0, --reveal name=number, --table sample.)",
@@ -32,7 +34,7 @@ ON_COMMAND_LINE: dict[type[Exception], str] = {
 """How the mends of errors are asked for there."""
 
 
-def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> TableWorld | SteppedWorld:
+def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> World:
     """The world of an experiment.
 
     Args:
@@ -62,12 +64,25 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
     except (NotTabular, NotDiscrete) as error:
         if not isinstance(env.action_space, spaces.Discrete):
             raise
-        if not isinstance(asked.learner, TrajectoryLP):
+        if "mdp" in takes(asked.learner):
             raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):
-            world.check(name, getattr(asked, name))
+            _check_stepping(name, getattr(asked, name), env)
         return world
+
+
+def _check_stepping(name: str, planner: Planner | None, env: gym.Env) -> None:
+    """Check that a planner needs no table.
+
+    Raises:
+        InvalidParameter: ValueIteration, which does.
+    """
+    if isinstance(planner, ValueIteration):
+        raise InvalidParameter(
+            f"{name} is value-iteration, but {env} has no table: expected an SB3 agent, such as ppo. Or make a table of cells "
+            "with bins."
+        )
 
 
 def _instead(error: NotTabular | NotDiscrete, env: gym.Env) -> str:

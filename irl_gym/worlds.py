@@ -1,13 +1,14 @@
 """Where a run of the loop takes place: a table, exact or of cells, or an environment that can only be stepped.
 
-Both train agents, run episodes and judge policies, in the same words. On a table a policy is its actions (S,) or probabilities
-(S, A), and values are exact; elsewhere it is whatever has SB3's `predict`, and values are means of episodes.
+Both train agents, run episodes and judge policies, in the same words, so that nobody asks which of the two it is; what only a
+table has is None elsewhere. On a table a policy is its actions or probabilities, and values are exact (`table_world`); else it
+is whatever has SB3's `predict`, and values are means of episodes. Axes: T steps.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -15,118 +16,24 @@ from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
-from irl_gym import metrics
 from irl_gym.closing import close
-from irl_gym.demonstrations import Episode, collect, collect_from_table
+from irl_gym.demonstrations import Episode
+from irl_gym.endings import AfterEnd
 from irl_gym.errors import InvalidParameter
+from irl_gym.features import batch_of_one
 from irl_gym.linear_reward import LinearReward
-from irl_gym.noise import Noisy, noisy
-from irl_gym.planners import FOR_ADVANTAGES, FOR_CONTROL, SB3, Agent, Planner, ValueIteration, load_agent, tabular_actions
-from irl_gym.policies import Policy, TabularPolicy, as_distribution, generator, load_actions
+from irl_gym.noise import Noisy
+from irl_gym.planners import FOR_CONTROL, SB3, Agent, Planner, load_agent
+from irl_gym.policies import Policy, generator
 from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
 from irl_gym.run_folder import RunFolder, read_json, write_json
 from irl_gym.simulator import RandomPolicy
-from irl_gym.tabular_vec_env import TabularVecEnv, shows_rows
-from irl_gym.tabulation import Tabulation
+from irl_gym.table_world import Choose, Glance, Progress, TableWorld, step_limit
 
-DEFAULT_EPISODE_STEPS = 500
-"""Time limit of episodes in environments that have none."""
 GLANCE = 20
 """Episodes for a point of the learning curve, where there is no table."""
-
-Progress = Callable[[int, Policy], None] | None
-
-
-def step_limit(env: gym.Env) -> int:
-    """Steps after which an episode is truncated."""
-    return (env.spec.max_episode_steps if env.spec is not None else None) or DEFAULT_EPISODE_STEPS
-
-
-@dataclass(frozen=True, eq=False)
-class TableWorld:
-    """An environment with a table."""
-
-    env: gym.Env
-    """The environment."""
-    table: Tabulation
-    """Exact, or of the cells of a grid: then values are the grid's, and episodes the environment's own."""
-    num_envs: int
-    """Copies that SB3 trains on."""
-    seed: int
-    """Of agents."""
-    horizon: int | None = None
-    """Steps that values count; None for all. The time limit, where the expert's value is that of episodes that were cut."""
-
-    @property
-    def gamma(self) -> float:
-        """Discount."""
-        return self.table.mdp.gamma
-
-    @property
-    def random(self) -> np.ndarray:
-        """(S, A) the random policy."""
-        mdp = self.table.mdp
-        return np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
-
-    def planner(self, *, shaped: bool) -> Planner:
-        """PPO, with settings that suit the reward."""
-        return SB3(hyperparameters=FOR_ADVANTAGES if shaped else {})
-
-    def expert(self) -> Planner:
-        """Exact planning."""
-        return ValueIteration()
-
-    def train(self, planner: Planner, reward: Any, progress: Progress = None) -> Policy:
-        """A policy for a reward, the true one if None, from steps of the table."""
-        paid = self.table.reward if reward is None else self.tabular(reward)
-        env = TabularVecEnv(
-            self.table.mdp, paid, num_envs=self.num_envs, max_episode_steps=step_limit(self.env),
-            states=self.table.states, show_rows=shows_rows(self.table.states), seed=self.seed,
-        )  # fmt: skip
-        return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
-
-    def tabular(self, reward: TabularReward | LinearReward) -> TabularReward:
-        """A reward of either kind in the table."""
-        return reward.tabular(self.table.states) if isinstance(reward, LinearReward) else reward
-
-    def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
-        """Write the actions, or with noise or of a table with several the probabilities; an agent in SB3's zip too."""
-        if isinstance(policy, Agent):
-            policy.save(folder / f"{name}.zip")
-        actions: Any = tabular_actions(policy, self.table.states)
-        if isinstance(policy, TabularPolicy) and not (policy.probabilities.max(axis=1) == 1).all():
-            actions = policy.probabilities
-        if epsilon:
-            actions = noisy(actions, epsilon, self.table.mdp.n_actions)
-        np.savez(folder / ("expert.npz" if name == "expert" else f"{name}_policy.npz"), actions=actions)
-
-    def load(self, folder: RunFolder, name: str) -> np.ndarray:
-        """(S,) actions; (S, A) probabilities of an expert read from data, NaN where nothing is known of it."""
-        return folder.load("expert.npz" if name == "expert" else f"{name}_policy.npz", load_actions)
-
-    def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
-        """Episodes: from the table where it is exact and holds every reward, else by stepping the environment."""
-        table, limit = self.table, step_limit(self.env)
-        if table.evidence.exact and table.payments.entries is not None:
-            drawn = collect_from_table(
-                table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=limit
-            )
-            return list(drawn)
-        distribution = as_distribution(policy, table.mdp.n_states, table.mdp.n_actions)
-        actor = TabularPolicy(distribution, table.states, seed)
-        if table.evidence.exact:
-            return list(collect(self.env, actor, n, seed=seed, max_episode_steps=limit))
-        return run_episodes(self.env, actor, n, seed=seed, most=limit, deterministic=False)
-
-    def value(self, policy: Any) -> float:
-        """Exact discounted value from d0 under the true reward; the grid's, where the table is of cells."""
-        return metrics.policy_value(self.table.mdp, self.table.reward, policy, self.horizon)
-
-    def glance(self, policy: Policy) -> float:
-        """The same, of a policy in training."""
-        return self.value(tabular_actions(policy, self.table.states))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +50,13 @@ class SteppedWorld:
     """Episodes of which a value is the mean."""
     seed: int
     """Of agents and episodes."""
+    table: ClassVar[None] = None
+    """There is none, nor what follows from one."""
+    mdp: ClassVar[None] = None
+    states: ClassVar[None] = None
+    true: ClassVar[None] = None
+    layout: ClassVar[None] = None
+    horizon: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         check_steppable(self.env)
@@ -165,18 +79,6 @@ class SteppedWorld:
             return SB3(total_timesteps=FOR_CONTROL.total_timesteps)
         return FOR_CONTROL
 
-    def check(self, name: str, planner: Planner | None) -> None:
-        """Check that a planner needs no table.
-
-        Raises:
-            InvalidParameter: ValueIteration, which does.
-        """
-        if isinstance(planner, ValueIteration):
-            raise InvalidParameter(
-                f"{name} is value-iteration, but {self.env} has no table: expected an SB3 agent, such as ppo. Or make a table "
-                "of cells with bins."
-            )
-
     def train(self, planner: Planner, reward: Any, progress: Progress = None) -> Policy:
         """A policy for a reward, the true one if None, from steps of the environment."""
         env: VecEnv = make_vec_env(maker_of(self.env), self.num_envs, seed=self.seed)
@@ -186,6 +88,28 @@ class SteppedWorld:
             return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
         finally:
             close(env)
+
+    def tabular(self, reward: TabularReward | LinearReward) -> None:
+        """A reward in the table: there is none."""
+
+    def weights(self, reward: TabularReward | LinearReward) -> LinearReward | None:
+        """A reward of observations: all that is known of it."""
+        return reward if isinstance(reward, LinearReward) else None
+
+    def paid(self, reward: Any, *, shaped: bool, margin_cap: float | None) -> Any:
+        """What an agent is paid: the reward as it is."""
+        return reward
+
+    def pays(
+        self, reward: TabularReward | LinearReward, observations: Sequence[Any], actions: Sequence[int], *, terminated: bool
+    ) -> tuple[list[int | None], np.ndarray]:
+        """No rows of T + 1 observations, and (T,) what a reward of them pays on arrival; NaN of another."""
+        known = self.weights(reward)
+        paid = [np.nan if known is None else known.of(batch_of_one(one))[0] for one in observations[1:]]
+        return [None] * len(observations), np.array(paid, dtype=np.float64)
+
+    def keep_table(self, folder: Path) -> None:
+        """Write nothing."""
 
     def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
         """Write an agent in SB3's zip, its algorithm and its noise as json."""
@@ -201,21 +125,43 @@ class SteppedWorld:
         space: Any = self.env.action_space
         return Noisy(agent, made["epsilon"], int(space.n), self.seed) if made["epsilon"] else agent
 
+    def known(self, episodes: list[Episode], after_end: AfterEnd) -> list[Episode]:
+        """Recorded episodes as they are."""
+        return episodes
+
+    def seen(self, episodes: list[Episode]) -> None:
+        """How often each action was taken in each state: there are no states to count by."""
+
+    def chooser(self, policy: Any, seed: int) -> Choose:
+        """What acts as in the episodes that judge a policy."""
+        actor = _anew(policy, seed)
+        return lambda observation: int(np.asarray(actor.predict(observation, deterministic=True)[0]))
+
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a policy, deterministic but for the random one and for noise, which is drawn anew from the seed."""
-        if isinstance(policy, Noisy):  # else it would depend on the episodes before, and so on where a run was continued
-            policy = replace(policy, seed=seed)
-        if isinstance(policy, RandomPolicy):
-            policy = self.random
-        return run_episodes(self.env, policy, n, seed=seed, most=step_limit(self.env))
+        return run_episodes(self.env, _anew(policy, seed), n, seed=seed, most=step_limit(self.env))
 
     def value(self, policy: Any) -> float:
         """Mean discounted return of `eval_episodes` episodes."""
         return discounted_mean(self.episodes(policy, self.eval_episodes, self.seed + 7_919), self.gamma)
 
-    def glance(self, policy: Policy) -> float:
-        """The same of a few episodes."""
-        return discounted_mean(self.episodes(policy, GLANCE, self.seed + 7_919), self.gamma)
+    def glance(self, policy: Policy) -> Glance:
+        """The same of a few episodes, and their returns."""
+        episodes = self.episodes(policy, GLANCE, self.seed + 7_919)
+        return discounted_mean(episodes, self.gamma), np.array([episode.total_reward for episode in episodes])
+
+    def returns(self, glanced: Sequence[np.ndarray]) -> tuple[Sequence[np.ndarray], None]:
+        """The returns themselves; others are possible."""
+        return glanced, None
+
+
+World = TableWorld | SteppedWorld
+"""Where a run takes place."""
+
+
+def _anew(policy: Any, seed: int) -> Any:
+    """The policy; noise is drawn anew, else it would depend on the episodes before, and so on where a run was continued."""
+    return replace(policy, seed=seed) if isinstance(policy, Noisy) else policy
 
 
 def discounted_mean(episodes: list[Episode], gamma: float) -> float:

@@ -21,8 +21,8 @@ from irl_gym.metrics import normalised_score, policy_value, random_value
 from irl_gym.optimality import certify
 from irl_gym.planners import tabular_actions
 from irl_gym.policies import Policy
+from irl_gym.table_world import step_limit
 from irl_gym.terminal import print_table
-from irl_gym.worlds import step_limit
 
 GAMMA = 0.99
 ENVIRONMENTS: dict[str, tuple[str, dict, tuple[int, ...]]] = {

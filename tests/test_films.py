@@ -1,6 +1,7 @@
 """Films: pictures and steps are of one episode, small, and the same for the same seed; where there are none, why."""
 
 import io
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
@@ -157,5 +158,6 @@ def test_the_film_of_a_dataset_is_its_first_episode(line, tmp_path):
     loop = Loop(Experiment(None, 0.99, **data, **QUICK, retrain=ValueIteration()), tmp_path)
     for stage in ("expert", "demonstrations", "reward"):
         loop.stage(stage)
-    film = filming.film(loop, "expert")
+    pays = partial(loop.world.pays, loop.learned)
+    film = filming.film("expert", loop.env, loop.demonstrations[0], None, pays, loop.env_id)
     assert len(film.steps) == 90 and "does not say with which seed" in film.without_frames

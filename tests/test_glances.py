@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from irl_gym.glances import Glances
+from irl_gym.table_world import TableWorld
 from irl_gym.tabulate import tabulate
-from irl_gym.worlds import SteppedWorld, TableWorld
+from irl_gym.worlds import SteppedWorld
 
 
 class Counting:

@@ -22,6 +22,7 @@ from irl_gym.features import OneHot
 from irl_gym.imports.frames import from_frame
 from irl_gym.learners.estimates import usable
 from irl_gym.learners.finite import FiniteLP
+from irl_gym.loop import MAKERS
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
 from irl_gym.runs import read_run
@@ -151,7 +152,7 @@ def run_of(log, root, learner=None, **how):
 @pytest.fixture(autouse=True)
 def no_figures(monkeypatch):
     """They take longer than all else here; other tests draw them."""
-    monkeypatch.setattr("irl_gym.loop.figures.draw", lambda loop, folder: None)
+    monkeypatch.setitem(MAKERS, "figures", ())
 
 
 def test_a_log_of_taxi_without_next_observations_teaches_the_drop_off(log, tmp_path):

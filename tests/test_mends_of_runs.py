@@ -24,8 +24,9 @@ from irl_gym.places import place_of
 from irl_gym.planners import SB3, Agent, ValueIteration
 from irl_gym.run_folder import read_json, write_json
 from irl_gym.runs import read_run
+from irl_gym.table_world import TableWorld
 from irl_gym.terminal import OPTIONS, check_writable
-from irl_gym.worlds import SteppedWorld, TableWorld
+from irl_gym.worlds import SteppedWorld
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 LAKE, CAR = gymnasium.make("FrozenLake-v1"), gymnasium.make("MountainCar-v0")

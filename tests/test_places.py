@@ -19,8 +19,9 @@ from irl_gym.loop import Loop
 from irl_gym.own_files import held
 from irl_gym.planners import SB3
 from irl_gym.table_files import TABLE, UNDER_WAY, kept_table, load_table
+from irl_gym.table_world import TableWorld
 from irl_gym.tabulate import tabulate
-from irl_gym.worlds import SteppedWorld, TableWorld
+from irl_gym.worlds import SteppedWorld
 
 
 class Walk(gym.Env):

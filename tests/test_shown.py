@@ -12,6 +12,7 @@ from irl_gym.experiment import Experiment
 from irl_gym.experts import load_expert
 from irl_gym.given import FromFile, check_agent, fingerprint
 from irl_gym.listed_states import ListedStates
+from irl_gym.loop import MAKERS
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
 from irl_gym.shown import read_shown, write_shown
@@ -121,7 +122,7 @@ def test_an_agent_of_another_numbering_is_refused(toy_text, tmp_path):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("irl_gym.loop.figures.draw", lambda loop, folder: None)
+        patch.setitem(MAKERS, "figures", ())
         asked = Experiment("Corridor-from-5-v0", 0.9, episodes=2, eval_episodes=5, retrain=SHORT, num_envs=2)
         return recover_and_retrain(asked, tmp_path_factory.mktemp("run") / "run")
 
@@ -136,7 +137,7 @@ def test_the_agent_of_a_run_acts_in_the_environment_itself(run):
 
 
 def test_the_agent_of_a_run_is_an_expert_for_another(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("irl_gym.loop.figures.draw", lambda loop, folder: None)
+    monkeypatch.setitem(MAKERS, "figures", ())
     expert = FromFile.at(str(run.out / "agent.zip"))
     again = recover_and_retrain(
         Experiment("Corridor-from-5-v0", 0.9, episodes=2, eval_episodes=5, expert=expert, retrain=SHORT, num_envs=2),

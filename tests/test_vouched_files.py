@@ -12,12 +12,12 @@ from irl_gym.errors import RunConflict, RunIncomplete
 from irl_gym.experiment import Experiment
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
+from irl_gym.policies import load_actions
 from irl_gym.report import print_report
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import FOR_PEOPLE, LOGS, read_json, write_json
 from irl_gym.runs import read_run
 from irl_gym.verified import recomputed
-from irl_gym.worlds import load_actions
 
 DATASET = "dataset/irl_gym/frozenlake-v1-expert-v0/data"
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 5, "eval_episodes": 5, "num_envs": 8, "retrain": ValueIteration()}

@@ -67,11 +67,20 @@ class IRLResult(Generic[AnyReward, AnyProof]):
 
 @runtime_checkable
 class Learner(Protocol):
-    """Turns a world without reward and an expert into a reward."""
+    """Turns a world without reward and an expert into a reward.
+
+    The loop gives `fit` a table and what is known of the expert's policy, unless the learner says in `takes` what else: names
+    of parts of the loop (`irl_gym.loop.Loop`), the first two in this order, any other by its name.
+    """
 
     def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:
         """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
         ...
+
+
+def takes(learner: Learner) -> tuple[str, ...]:
+    """The parts of the loop that a learner's `fit` is given."""
+    return getattr(learner, "takes", ("mdp", "known_expert"))
 
 
 def without_nan(value: Any) -> Any:

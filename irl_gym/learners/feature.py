@@ -26,7 +26,7 @@ Axes: S states, A actions, K features.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -82,6 +82,8 @@ class FeatureLP:
     Kept within a fifth, as `FiniteLP.time_limit` is; a caller's features are not cut."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
+    takes: ClassVar[tuple[str, ...]] = ("mdp", "known_expert", "states")
+    """What the loop gives `fit`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))

@@ -26,7 +26,7 @@ Axes: S states, A actions.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -75,6 +75,10 @@ class FiniteLP:
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
     """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
+    takes: ClassVar[tuple[str, ...]] = ("mdp", "known_expert", "visits")
+    """What the loop gives `fit`."""
+    of_feasible_set: ClassVar[bool] = True
+    """Is the reward one of those that `irl_gym.ambiguity` describes, by how far they reach and how they depend on lambda?"""
 
     def __post_init__(self) -> None:
         checked_number("r_max", self.r_max, "a bound above 0, such as 1.0", above=0)

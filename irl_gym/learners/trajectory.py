@@ -17,7 +17,7 @@ Axes: N episodes, K features.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, runtime_checkable
+from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -94,6 +94,8 @@ class TrajectoryLP:
     time_limit: float | None = None
     """Seconds for the whole fit: its programs, all attempts at them, planning by value iteration and trajectories; None for
     no limit. An agent's training is not cut: the time is up when the next program would begin."""
+    takes: ClassVar[tuple[str, ...]] = ("simulator", "demonstrations")
+    """What the loop gives `fit`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "features", as_features(self.features))

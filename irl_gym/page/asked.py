@@ -8,44 +8,45 @@ from typing import Any
 from irl_gym.claims import flag_of, into_folder, ours
 from irl_gym.page.again import NOT_HERE, defaults, is_part, missing, python_lines, usual
 from irl_gym.page.sections import Section
-from irl_gym.runs import Run
 
 _NO_DEFAULT = object()
 
 
-def asked(run: Run) -> Section:
+def asked(
+    version: Mapping[str, Any], env_id: str | None, config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]]
+) -> Section:
     """The configuration as a table, and the command."""
-    command = run.version.get("command")
+    command = version.get("command")
     if command is None:
-        changed = [(key, written(value)) for key, value in differing(run.config)]
+        changed = [(key, written(value)) for key, value in differing(config)]
         lead = "Listed is what differs from the defaults; everything else is below."
     else:
-        changed = [("environment", str(run.env_id or run.config.get("dataset"))), *typed(command)]
+        changed = [("environment", str(env_id or config.get("dataset"))), *typed(command)]
         lead = "Listed is what the command asked for; everything else, most of it by default, is below."
-    lost = run.stages.get("demonstrations", {}).get("no_environment")
+    lost = stages.get("demonstrations", {}).get("no_environment")
     changed += [("demonstrations", str(lost))] if lost else []
-    whole = json.dumps(dict(run.config), indent=1, sort_keys=True)
+    whole = json.dumps(dict(config), indent=1, sort_keys=True)
     return Section("asked", "What was asked", lead, (), "asked", {"lines": changed, "raw": whole})
 
 
-def reproduce(run: Run) -> Section:
+def reproduce(version: Mapping[str, Any], config: Mapping[str, Any]) -> Section:
     """The command that makes the run again; where there was none, lines of Python."""
-    title = "Run it again"
-    if run.command is not None:
+    title, command = "Run it again", version.get("command")
+    if command is not None:
         lead = (
             "In the environment where irl_gym is installed this command makes the same run again, in a folder of its own: the "
             "same seed gives the same files."
         )
-        if not ours(run.version["command"]):
+        if not ours(command):
             lead = "The run notes this command, which is of another program than irl_gym: look at it before you run it."
-        again = shlex.join(into_folder(run.version["command"]))
+        again = shlex.join(into_folder(command))
         return Section("reproduce", title, lead, (), "command", {"command": again})
     lead = (
         "The run was started from Python."
-        if run.version
+        if version
         else "An earlier version of irl_gym made the run, which did not note how it was started."
     )
-    absent = missing(run.config)
+    absent = missing(config)
     if absent:
         lead += (
             f" This page cannot make it again: of some things it holds a digest or a name alone. Put your own in place of each "
@@ -53,7 +54,7 @@ def reproduce(run: Run) -> Section:
         )
     else:
         lead += " These lines of Python make it again:"
-    return Section("reproduce", title, lead, (), "command", {"command": python_lines(run.config)})
+    return Section("reproduce", title, lead, (), "command", {"command": python_lines(config)})
 
 
 def typed(command: Sequence[str]) -> Iterator[tuple[str, str]]:

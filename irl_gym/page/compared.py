@@ -11,7 +11,6 @@ from irl_gym.page.panels import Panel, bars, spread, telling
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
 from irl_gym.rewards import TabularReward
-from irl_gym.runs import Run
 from irl_gym.written import aligned, counted, number, percent
 
 MOST_ROWS = 40
@@ -20,13 +19,11 @@ FEW = 4
 """Payments of different sizes that are counted one by one."""
 
 
-def rewards(run: Run, scene: Scene | None) -> Section:
+def rewards(scene: Scene) -> Section:
     """The environment's reward beside the learned one, each on its own scale."""
-    if scene is None:
-        return _weights(run)
     made = [
-        reward_panel(f"reward-{name}", f"{title} reward", reward, scene)
-        for name, title, reward in (("true", "True", scene.table.reward), ("learned", "Learned", scene.learned))
+        reward_panel(f"reward-{name}", f"{title} reward", paid, scene)
+        for name, title, paid in (("true", "True", scene.table.reward), ("learned", "Learned", scene.learned))
     ]
     lead = (
         "What the environment pays, which the learner never saw, beside what was recovered from the expert. Each has its own "
@@ -35,11 +32,12 @@ def rewards(run: Run, scene: Scene | None) -> Section:
     return Section("rewards", "Rewards", lead, made)
 
 
-def _weights(run: Run) -> Section:
+def weights(weights: TabularReward | LinearReward) -> Section:
+    """What a reward that is not known state by state is made of."""
     lead = "This environment was stepped, not tabulated, so there is no true reward state by state to compare with. "
-    if not isinstance(run.learned, LinearReward):
+    if not isinstance(weights, LinearReward):
         return Section("rewards", "Rewards", lead)
-    alpha, features = run.learned.alpha, run.learned.features
+    alpha, features = weights.alpha, weights.features
     order = telling(alpha)
     centres = getattr(features, "centres", None)
     where = [_at(centres, int(i)) for i in order]
@@ -74,7 +72,7 @@ def reward_panel(name: str, title: str, reward: TabularReward, scene: Scene) -> 
         told += " Each cell has one field for each move."
         if not scene.place.layout.directions.any(axis=1).all():
             told += " The one in its middle is for staying."
-        return maps.crosses(name, title, scene.place, R, scene.run.actions, caption=told, shown=acting)
+        return maps.crosses(name, title, scene.place, R, scene.actions, caption=told, shown=acting)
     if scene.place is not None:
         told += " Drawn is the largest over actions."
         return maps.heat(
@@ -82,7 +80,7 @@ def reward_panel(name: str, title: str, reward: TabularReward, scene: Scene) -> 
         )
     rows = np.flatnonzero(np.repeat(acting, table.n_actions))
     order = rows[telling(R.ravel()[rows])]
-    names = [f"{scene.run.actions[a]} in {scene.name(int(s))}" for s, a in zip(*np.divmod(order, table.n_actions), strict=True)]
+    names = [f"{scene.actions[a]} in {scene.name(int(s))}" for s, a in zip(*np.divmod(order, table.n_actions), strict=True)]
     told += f" {_left_out(order.size, rows.size, 'steps')}"
     return bars(name, title, R.ravel()[order], names, what="reward", caption=told, unit="reward of a step")
 
@@ -200,13 +198,13 @@ def _deviations(scene: Scene, rows: Indices) -> list[dict[str, str]]:
 
 def _deviation(scene: Scene, row: int) -> dict[str, str]:
     def told(actions: np.ndarray) -> str:
-        return " or ".join(scene.run.actions[a] for a in np.flatnonzero(actions))
+        return " or ".join(scene.actions[a] for a in np.flatnonzero(actions))
 
     return {
         "state": scene.name(int(row)),
         "expert": told(chosen(scene.expert)[row]) if scene.seen[row] else "not seen",
         "optimal": told(scene.optimal[row]),
-        "agent": scene.run.actions[int(scene.agent[row].argmax())],
+        "agent": scene.actions[int(scene.agent[row].argmax())],
     }
 
 
@@ -220,7 +218,7 @@ def policy_panels(scene: Scene) -> list[Panel]:
         told = "In how many states each takes an action; a state with several counts for each of them."
         return [
             panels.grouped_bars(
-                "policy-counts", "Actions taken", counts, scene.run.actions, caption=told, unit="states in which it is taken"
+                "policy-counts", "Actions taken", counts, scene.actions, caption=told, unit="states in which it is taken"
             )
         ]
     several = " Several arrows: several actions." if (chosen(scene.expert)[known].sum(axis=1) > 1).any() else ""
@@ -231,7 +229,7 @@ def policy_panels(scene: Scene) -> list[Panel]:
     if not place.arrows:
         return [
             maps.choices(
-                name, title, place, np.where(shown, policy.argmax(axis=1), np.nan), scene.run.actions, caption=captions[name]
+                name, title, place, np.where(shown, policy.argmax(axis=1), np.nan), scene.actions, caption=captions[name]
             )
             for name, title, policy, shown in sides
         ]

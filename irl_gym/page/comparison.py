@@ -16,6 +16,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.measures import explained, shown
 from irl_gym.page import compared
 from irl_gym.page.asked import written
+from irl_gym.page.contents import Contents
 from irl_gym.page.document import write_page
 from irl_gym.page.panels import Panel
 from irl_gym.page.pooled import over_seeds
@@ -77,7 +78,7 @@ def lettered(runs: Sequence[Run]) -> dict[str, Run]:
 
 def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the template shows, and the scripts."""
-    scenes = {letter: Scene.of(run) for letter, run in named.items()}
+    scenes = {letter: Contents(run).scene for letter, run in named.items()}
     places, found = run_places(named), pools(named)
     sections = [
         _results(named),
@@ -90,7 +91,7 @@ def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
         _doctors(named),
     ]
     kept = [section for section in sections if section is not None]
-    facts = [(letter, f"{run_title(run, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
+    facts = [(letter, f"{run_title(run.config, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
     facts += [(letter, run.caution) for letter, run in named.items() if run.caution is not None]
     told = {run.whose: [letter for letter, one in named.items() if one.whose == run.whose] for run in named.values()}
     facts += [(", ".join(letters), whose) for whose, letters in told.items()]
@@ -164,7 +165,7 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
     for letter, run in named.items():
         scene = scenes[letter]
         if scene is None:
-            section = compared.rewards(run, None)
+            section = compared.weights(run.learned)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
             made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))

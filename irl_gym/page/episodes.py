@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from irl_gym.films import MOST_BYTES, Film, Moment
-from irl_gym.page.maps import geometry
-from irl_gym.page.scene import Scene
+from irl_gym.page.absent import EPISODES
+from irl_gym.page.maps import Map, geometry
 from irl_gym.page.sections import Section
-from irl_gym.runs import Run
 from irl_gym.written import counted, sentence_of, state_called, sum_of
 
 TITLES = {"expert": "Expert", "agent": "Retrained agent"}
@@ -23,12 +22,8 @@ ENDS = {
 }
 
 
-def episodes(run: Run, scene: Scene | None) -> tuple[Section, dict[str, Any]]:
-    """The section, and what its script plays."""
-    films = {name: film for name, film in run.films.items() if film.steps}
-    if not films:
-        return Section("episodes", "Episodes", "No episode of this run was filmed."), {}
-    place = None if scene is None or scene.place is None or scene.place.plane is not None else scene.place
+def episodes(films: Mapping[str, Film], place: Map | None) -> Section:
+    """Films to be played, over the map where they have no pictures."""
     players = []
     for name, film in films.items():
         pictures, of = _pictures(film)
@@ -46,7 +41,7 @@ def episodes(run: Run, scene: Scene | None) -> tuple[Section, dict[str, Any]]:
         "any moment."
     )
     told = [_told(name, film) for name, film in films.items()]
-    return Section("episodes", "Episodes", lead, (), "episodes", {"players": told}), {"players": players}
+    return Section(*EPISODES, lead, (), "episodes", {"players": told}, {"episodes": {"players": players}})
 
 
 def _told(name: str, film: Film) -> dict[str, Any]:
@@ -75,7 +70,7 @@ def _pictures(film: Film) -> tuple[list[str], int]:
     return [f"data:image/{film.kind};base64,{base64.b64encode(one).decode()}" for one in kept], every
 
 
-def _moment(moment: Moment, film: Film, every: int, place: Any) -> dict[str, Any]:
+def _moment(moment: Moment, film: Film, every: int, place: Map | None) -> dict[str, Any]:
     """One row of the table of steps, and what is drawn."""
     told: dict[str, Any] = {
         "text": state_called(moment.text),
@@ -92,7 +87,7 @@ def _moment(moment: Moment, film: Film, every: int, place: Any) -> dict[str, Any
     return told
 
 
-def _map(place: Any) -> Mapping[str, Any]:
+def _map(place: Map) -> Mapping[str, Any]:
     """The map that a token moves over."""
     layout = place.layout
     return {

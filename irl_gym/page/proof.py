@@ -7,24 +7,26 @@ from typing import Any
 from irl_gym.certificates import facts_in
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
+from irl_gym.page.absent import TABLE
 from irl_gym.page.sections import Section
 from irl_gym.runs import Run
+from irl_gym.tabulation import Tabulation
 from irl_gym.written import counted, number, sentence_of
 
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
 
 
-def certificate(run: Run) -> Section:
+def proved(certificate: Mapping[str, Any], recomputed: bool, table: Tabulation | None) -> Section:
     """What the learned reward says of the expert, what its learner proves, and the raw numbers behind both."""
-    raw = json.dumps(dict(run.certificate), indent=1, sort_keys=True, default=str)
-    of_reward, of_program = facts_in(run.certificate)
+    raw = json.dumps(dict(certificate), indent=1, sort_keys=True, default=str)
+    of_reward, of_program = facts_in(certificate)
     parts = [
-        {"title": f"Of the reward: {whence(run.recomputed)}", "lines": [(one.label, one.sentence) for one in of_reward]},
+        {"title": f"Of the reward: {whence(recomputed)}", "lines": [(one.label, one.sentence) for one in of_reward]},
         {"title": f"Of its program: {whence(False)}", "lines": [(one.label, one.sentence) for one in of_program]},
     ]
     lead = "What the reward says of the expert, from the table, the expert and the reward alone, and what its learner proves."
-    if run.table is None:
+    if table is None:
         lead = "What the learner proves, from the sampled trajectories and the reward alone. Without a table there is no more."
     shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}
     return Section("certificate", "Certificate", f"{lead} No solver's word is taken.", (), "certificate", shown)
@@ -59,18 +61,12 @@ def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def table_facts(run: Run) -> Section:
+def table_facts(told_of_table: Mapping[str, Any], actions: tuple[str, ...]) -> Section:
     """How big the table is, and how far it is to be trusted."""
-    told = run.metrics.get("table")
-    if told is None:
-        lead = (
-            "There is no table: the environment was stepped, and everything is estimated from episodes. So this page has no "
-            "values, policies, lambda slider and feasible widths state by state."
-        )
-        return Section("table", "The table", lead)
+    told = told_of_table
     lines = [
         ("States", f"{told['states']:,}, of which episodes visit {told['reachable']:,}"),
-        ("Actions", f"{told['actions']:,}: {', '.join(run.actions[:12])}"),
+        ("Actions", f"{told['actions']:,}: {', '.join(actions[:12])}"),
         ("Transitions", f"{told['transitions']:,}"),
     ]
     if "exact" in told:
@@ -88,4 +84,4 @@ def table_facts(run: Run) -> Section:
         lines.append(
             ("Checked", f"{check['steps']:,} steps of the environment, no contradiction; p = {number(check['p_value'], 2)}")
         )
-    return Section("table", "The table", "What the environment was turned into.", (), "facts", {"lines": lines})
+    return Section(*TABLE, "What the environment was turned into.", (), "facts", {"lines": lines})

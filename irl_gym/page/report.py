@@ -5,13 +5,16 @@ feasible widths, the learning curve, episodes; then what proves it, what the doc
 """
 
 import os
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from irl_gym.needs import missing, supplied
 from irl_gym.page import compared, episodes, slider, training
+from irl_gym.page.absent import absent
 from irl_gym.page.asked import asked, reproduce
+from irl_gym.page.contents import Contents
 from irl_gym.page.document import write_page
-from irl_gym.page.proof import certificate, doctor, table_facts
-from irl_gym.page.scene import Scene
+from irl_gym.page.proof import doctor, proved, table_facts
 from irl_gym.page.sections import Section, specs
 from irl_gym.page.verdict import policies_table, verdict
 from irl_gym.runs import Run
@@ -31,42 +34,33 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         run: what a run left.
         path: of the file.
     """
-    scene = Scene.of(run)
-    of_states, path_data = ([], None) if scene is None else _of_states(scene)
-    episode_section, episode_data = episodes.episodes(run, scene)
-    sections = [
-        policies_table(run.metrics),
-        compared.rewards(run, scene),
-        *of_states,
-        training.learning(run),
-        episode_section,
-        certificate(run),
-        doctor(run),
-        table_facts(run),
-        stages(run),
-        asked(run),
-        reproduce(run),
-    ]
+    sections = list(sections_of(run))
     context = {
-        "title": page_title(run),
-        "facts": facts(run),
+        "title": page_title(run.env_id, run.config),
+        "facts": supplied(facts, run),
         "verdict": verdict(run.metrics, recomputed=run.recomputed),
         "sections": sections,
     }
-    data = {"figures": specs(sections), "slider": path_data, "episodes": episode_data}
+    data: dict[str, Any] = {"figures": specs(sections), "slider": None, "episodes": {}}
+    for section in sections:
+        data |= section.script
     write_page(path, "report.html", context, data, SCRIPTS)
 
 
-def _of_states(scene: Scene) -> tuple[list[Section], dict[str, Any] | None]:
-    """What is known state by state, and what the slider shows."""
-    path, data = slider.lambda_slider(scene)
-    return [compared.values(scene), compared.policies(scene), path, training.widths(scene)], data
+def sections_of(run: Run) -> Iterator[Section]:
+    """The sections of a run's page, or in place of one why it is absent."""
+    contents = Contents(run)
+    for show in SECTIONS:
+        need = missing(show, contents, run)
+        section = supplied(show, contents, run) if need is None else absent(need, run.stages)
+        if section is not None:
+            yield section
 
 
-def stages(run: Run) -> Section:
+def stages_table(stages: Mapping[str, Mapping[str, Any]]) -> Section:
     """How long each stage took. Of these the page of the same run differs from machine to machine, and of nothing else."""
     rows = []
-    for name, record in run.stages.items():
+    for name, record in stages.items():
         if name == "report":  # it is being written
             continue
         steps = record.get("environment_steps", 0)
@@ -74,14 +68,13 @@ def stages(run: Run) -> Section:
     return Section("stages", "Stages", STAGES_LEAD, (), "stages", {"rows": rows})
 
 
-def page_title(run: Run) -> str:
+def page_title(env_id: str | None, config: Mapping[str, Any]) -> str:
     """The environment."""
-    return str(run.env_id or run.config.get("env_id") or run.config.get("dataset"))
+    return str(env_id or config.get("env_id") or config.get("dataset"))
 
 
-def facts(run: Run) -> list[tuple[str, str]]:
+def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | None, whose: str) -> list[tuple[str, str]]:
     """What stands below the title."""
-    config = run.config
     told = [
         ("learner", str((config.get("learner") or {}).get("type", "not known"))),
         ("gamma", number(config.get("gamma"))),
@@ -91,9 +84,34 @@ def facts(run: Run) -> list[tuple[str, str]]:
         told.insert(0, ("environment", ", ".join(f"{key}={value}" for key, value in config["env_kwargs"].items())))
     if config.get("dataset"):
         told.append(("dataset", str(config["dataset"])))
-    if run.version.get("irl_gym"):
-        told.append(("irl_gym", str(run.version["irl_gym"])))
-    if run.caution is not None:
-        told.append(("files", run.caution))
-    told.append(("on this page", run.whose))
+    if version.get("irl_gym"):
+        told.append(("irl_gym", str(version["irl_gym"])))
+    if caution is not None:
+        told.append(("files", caution))
+    told.append(("on this page", whose))
     return told
+
+
+def _doctor(run: Run, diagnosis: Mapping[str, Any]) -> Section:
+    """To be joined: `proof.doctor` shall be a function of the diagnosis, and what it says where there is none go."""
+    return doctor(run)
+
+
+SECTIONS: tuple[Callable[..., Section], ...] = (
+    policies_table,
+    compared.rewards,
+    compared.weights,
+    compared.values,
+    compared.policies,
+    slider.lambda_slider,
+    training.widths,
+    training.learning,
+    episodes.episodes,
+    proved,
+    _doctor,
+    table_facts,
+    stages_table,
+    asked,
+    reproduce,
+)
+"""In order: each is shown where what it needs is there (`Contents`, then the run's own fields)."""

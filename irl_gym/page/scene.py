@@ -1,9 +1,9 @@
-"""What the page needs of a run's table, worked out once: who acts how, what is optimal, and where states lie.
+"""What the page needs of a table, worked out once: who acts how, what is optimal, and where states lie.
 
 Axes: S states, A actions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,12 +13,12 @@ from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
 from irl_gym.dynamic_programming import evaluate_policy, optimum
 from irl_gym.evaluation import good_actions
 from irl_gym.howard import Optimum
+from irl_gym.layouts import GridLayout
 from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import ties_of
 from irl_gym.page.maps import Map
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
-from irl_gym.runs import Run
 from irl_gym.tabulation import Tabulation
 from irl_gym.written import state_called
 
@@ -28,18 +28,24 @@ LEAST_SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A run with a table."""
+    """What is known state by state, and what is recovered there."""
 
-    run: Run
     table: Tabulation
+    """P, d0, gamma, the true reward and the states."""
     learned: TabularReward
     """The recovered reward on the rows of the table."""
-
-    @classmethod
-    def of(cls, run: Run) -> "Scene | None":
-        """The scene of a run; None where it has no table."""
-        learned = run.tabular
-        return None if run.table is None or learned is None else cls(run, run.table, learned)
+    known_expert: np.ndarray | None
+    """(S,) actions, or (S, A) probabilities with rows of NaN where nothing is known; None where nothing is known at all."""
+    known_agent: np.ndarray | None
+    """(S,) actions of the retrained agent, or (S, A)."""
+    actions: tuple[str, ...]
+    """(A,) names of the actions."""
+    called: Callable[[int], str]
+    """What a row's state is called."""
+    grid: GridLayout | None = None
+    """Where the states lie on a map of cells."""
+    by_episodes: bool = False
+    """Is the expert known by episodes only? Then optimal actions are good, not its own."""
 
     @property
     def mdp(self) -> TabularMDP:
@@ -54,12 +60,12 @@ class Scene:
     @cached_property
     def place(self) -> Map | None:
         """Where states lie, if on a map."""
-        return Map.of(self.run.grid, self.table.states, self.mdp)
+        return Map.of(self.grid, self.table.states, self.mdp)
 
     @cached_property
     def seen(self) -> StateMask:
         """(S,) states in which the expert's action is known."""
-        expert = self.run.expert
+        expert = self.known_expert
         if expert is None or expert.ndim == 1:
             return np.full(self.mdp.n_states, expert is not None)
         return np.logical_not(np.isnan(expert).any(axis=1))
@@ -67,7 +73,7 @@ class Scene:
     @cached_property
     def expert(self) -> Matrix:
         """(S, A) the expert's probabilities; uniform where nothing is known."""
-        policy = self.run.expert
+        policy = self.known_expert
         if policy is None or policy.ndim == 1:
             return self._distribution(policy)
         return self._distribution(np.where(self.seen[:, None], policy, 1 / self.mdp.n_actions))
@@ -75,7 +81,7 @@ class Scene:
     @cached_property
     def agent(self) -> Matrix:
         """(S, A) the retrained agent's probabilities."""
-        return self._distribution(self.run.agent)
+        return self._distribution(self.known_agent)
 
     def _distribution(self, policy: np.ndarray | None) -> np.ndarray:
         n_states, n_actions = self.mdp.n_states, self.mdp.n_actions
@@ -94,8 +100,7 @@ class Scene:
     @cached_property
     def good(self) -> ActionSets:
         """(S, A) the actions that the agreement of metrics.json counts: the optimal ones, or a poor expert's own."""
-        errs = self.run.metrics.get("demonstrations", {}).get("episodes_only", False)
-        return good_actions(self.mdp, None if errs else self.run.expert, self.best)
+        return good_actions(self.mdp, None if self.by_episodes else self.known_expert, self.best)
 
     @cached_property
     def deviates(self) -> StateMask:
@@ -120,7 +125,7 @@ class Scene:
     def name(self, row: int) -> str:
         """What a state is called."""
         ended = " (ended)" if row in self._copies or self.mdp.terminal[row] else ""
-        return state_called(self.run.state_name(row)) + ended
+        return state_called(self.called(row)) + ended
 
     @cached_property
     def _copies(self) -> frozenset[int]:

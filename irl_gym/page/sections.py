@@ -21,6 +21,8 @@ class Section:
     """Which part of the template shows it."""
     shown: Mapping[str, Any] = field(default_factory=dict)
     """More for the template."""
+    script: Mapping[str, Any] = field(default_factory=dict)
+    """What the page's scripts move, by the name that they know it by."""
 
 
 def specs(sections: Sequence[Section]) -> dict[str, Any]:

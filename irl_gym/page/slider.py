@@ -19,11 +19,12 @@ from irl_gym.discounted import Discounted
 from irl_gym.dynamic_programming import backup, tied
 from irl_gym.metrics import optimal_actions
 from irl_gym.page import maps, panels
+from irl_gym.page.absent import LAMBDA
 from irl_gym.page.panels import Panel, axis, blank, plotted, telling
 from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section
 from irl_gym.rewards import TabularReward
-from irl_gym.written import listed, number, sentence_of
+from irl_gym.written import listed, number
 
 MOST_PIECES = 240
 """Positions of the slider."""
@@ -36,8 +37,6 @@ MOST_CELLS = 90_000
 BARS = 24
 STATES = re.compile(r"(?<=of )states? (\d+(?:, \d+)*)")
 """States as the sentences of a path name them, by row."""
-TITLE = "The price of a large reward"
-NO_PATH = "How the reward changes with lambda, the price of its norm, was not worked out for this run."
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,27 +106,22 @@ def _named(sentence: str, scene: Scene) -> str:
     return STATES.sub(called, sentence)
 
 
-def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
-    """The section, and what its script shows at each position; None where there is no path."""
-    path = scene.run.lambda_path
-    if path is None or len(path["rewards"]) == 0:
-        told = scene.run.stages.get("ambiguity", {})
-        why = told.get("no_path") or told.get("no_ambiguity")
-        return Section("lambda", TITLE, f"{NO_PATH} {sentence_of(why)}".strip()), None
+def lambda_slider(scene: Scene, lambda_path: Mapping[str, Any], certificate: Mapping[str, Any]) -> Section:
+    """What the optimum is at each price, and at which the run's own reward is."""
     size = scene.place.layout.n_cells if scene.place is not None else 3 * BARS
-    pieces = Pieces.of_path(path, min(MOST_PIECES, MOST_CELLS // size))
+    pieces = Pieces.of_path(lambda_path, min(MOST_PIECES, MOST_CELLS // size))
     pieces = replace(pieces, changes=tuple(_named(one, scene) for one in pieces.changes))
     sets = greedy_sets(scene, pieces.rewards)
     shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
     data = {
-        "start": _own(pieces, scene.run.certificate["proof"].get("l1")),
+        "start": _own(pieces, certificate["proof"].get("l1")),
         "pieces": [_told(pieces, i) for i in range(len(pieces.low))],
         "figures": {panel.name: changing for panel, changing in shown},
     }
     thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
-    if not path.get("exact", True):
-        more = number(float(path["gap"]), 2)
-        stopped = not path.get("whole", path["exact"])
+    if not lambda_path.get("exact", True):
+        more = number(float(lambda_path["gap"]), 2)
+        stopped = not lambda_path.get("whole", lambda_path["exact"])
         thinned += (
             f" There are more pieces than were worked out: between these the objective can be {more} larger."
             if stopped
@@ -139,7 +133,7 @@ def lambda_slider(scene: Scene) -> tuple[Section, dict[str, Any] | None]:
     )
     made = [panel for panel, _ in shown]
     steps = {"last": len(pieces.low) - 1, "start": data["start"], "first": data["pieces"][data["start"]]}
-    return Section("lambda", TITLE, lead, made, "lambda", steps), data
+    return Section(*LAMBDA, lead, made, "lambda", steps, {"slider": data})
 
 
 def greedy_sets(scene: Scene, rewards: np.ndarray) -> list[ActionSets]:
@@ -251,7 +245,7 @@ def _policy(scene: Scene, sets: list[ActionSets]) -> tuple[Panel, dict[str, Any]
     counts = [(one & acting[:, None]).sum(axis=0) for one in sets]
     caption = "In how many states each action is a best one under this reward; ties count for each."
     panel = panels.grouped_bars(
-        "path-policy", "Best actions", {"best": counts[0]}, scene.run.actions, caption=caption, unit="states"
+        "path-policy", "Best actions", {"best": counts[0]}, scene.actions, caption=caption, unit="states"
     )
     panel.figure.layout.xaxis.range = [0, 1.05 * float(acting.sum())]
     return panel, {"kind": "x", "trace": 0, "values": [listed(one) for one in counts]}

@@ -7,15 +7,14 @@ import numpy as np
 
 from irl_gym.curves import Curve
 from irl_gym.page import panels
+from irl_gym.page.absent import LEARNING, WIDTHS
 from irl_gym.page.compared import of_states
 from irl_gym.page.panels import Panel, axis, below, blank, plotted, spread
 from irl_gym.page.scene import Scene, chosen
 from irl_gym.page.sections import Section
-from irl_gym.runs import Run
 from irl_gym.scores import agent_of
-from irl_gym.written import listed, number, sentence_of
+from irl_gym.written import listed, number
 
-PLANNED = "The agent was planned exactly, not trained, so it has no learning curve."
 COLOURS = tuple(f"run{i}" for i in range(6))
 """Of the lines of one figure, in turn: far apart in hue and lightness, for the colour-blind too; levels have others."""
 DASHES = ("solid", "9px,3px", "9px,3px,2px,3px", "4px,2px", "9px,3px,2px,3px,2px,3px")
@@ -58,25 +57,19 @@ def usual_levels(expert: float | None, random: float | None) -> tuple[Level, Lev
     return Level("expert", expert, "ink", "dash"), Level("random", random, "muted", "dot")
 
 
-def learning(run: Run) -> Section:
+def learning(curve: Curve, policies: Mapping[str, Any], training: Mapping[str, Any]) -> Section:
     """What the agent earned under the true reward as it trained."""
-    curve = run.curve
-    if not len(curve.steps):
-        return Section("learning", "Learning curve", PLANNED)
-    policies = run.metrics["policies"]
     made = [_values(curve, policies)]
     if np.isfinite(curve.mean).any():
         made.append(_returns(curve, policies))
-    lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward.{_settled(run)}"
-    return Section("learning", "Learning curve", lead, made)
+    told = "" if policies[agent_of(policies)]["score"] is None else _settled(training)
+    lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward.{told}"
+    return Section(*LEARNING, lead, made)
 
 
-def _settled(run: Run) -> str:
-    """When the agent was as good as it should be; nothing where there is no score."""
-    policies = run.metrics["policies"]
-    if policies[agent_of(policies)]["score"] is None:
-        return ""
-    taken = run.metrics["training"].get("steps_to_0.99")
+def _settled(training: Mapping[str, Any]) -> str:
+    """When the agent was as good as it should be."""
+    taken = training.get("steps_to_0.99")
     if taken is None:
         return " The score did not stay at 0.99 or more."
     return f" From {taken:,} environment steps on the score stays at 0.99 or more."
@@ -148,24 +141,21 @@ def _outline(steps: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.n
     return np.array(x[:-1]), np.array(y[:-1])
 
 
-def widths(scene: Scene) -> Section:
+def widths(
+    scene: Scene, widths: Mapping[str, np.ndarray], learner: Mapping[str, Any], certificate: Mapping[str, Any]
+) -> Section:
     """How far the reward of each state is left open by what the expert does."""
-    title = "What the expert leaves open"
-    if scene.run.widths is None:
-        made = scene.run.stages.get("ambiguity", {})
-        why = sentence_of(made.get("no_widths") or made.get("no_ambiguity"))
-        return Section("widths", title, f"How wide the feasible set is was not worked out for this run. {why}".strip())
-    found = scene.run.widths
     over = {"width": np.fmax, "low": np.fmin, "high": np.fmax}
-    width, low, high = (_of_states(found[key], scene, which) for key, which in over.items())
+    width, low, high = (_of_states(widths[key], scene, which) for key, which in over.items())
     shown = np.isfinite(width) & scene.mdp.reachable
-    of_steps = " Drawn is that of the step which the expert takes." if np.ndim(found["width"]) == 2 else ""
+    of_steps = " Drawn is that of the step which the expert takes." if np.ndim(widths["width"]) == 2 else ""
     if not shown.any():
-        return Section("widths", title, "No state's reward is bounded by what the expert does.")
+        return Section(*WIDTHS, "No state's reward is bounded by what the expert does.")
+    largest = float(learner.get("r_max") or 1.0)
     lead = (
-        f"Considered are all rewards within +-{number(_largest_reward(scene.run))} under which the expert is optimal with a "
-        f"margin of at least {_least_margin(scene.run)} over every action that it can be better than. The width is how far a "
-        "state's reward can move among them: 0 says that the expert settles it, a wide one that almost anything goes."
+        f"Considered are all rewards within +-{number(largest)} under which the expert is optimal with a margin of "
+        f"at least {_least_margin(learner, certificate)} over every action that it can be better than. The width is how far "
+        "a state's reward can move among them: 0 says that the expert settles it, a wide one that almost anything goes."
     )
     made = [of_states("widths-map", "Feasible width", width, scene, f"Widths {spread(width[shown])}.{of_steps}",
                       scale=panels.WIDTHS, centred=False, shown=shown, unit="width")]  # fmt: skip
@@ -175,18 +165,14 @@ def widths(scene: Scene) -> Section:
                       scale=panels.REWARDS, centred=True, shown=shown)
             for key, name, bound in (("low", "Least feasible reward", low), ("high", "Largest feasible reward", high))
         ]  # fmt: skip
-    return Section("widths", title, lead, made)
+    return Section(*WIDTHS, lead, made)
 
 
-def _largest_reward(run: Run) -> float:
-    return float((run.config.get("learner") or {}).get("r_max") or 1.0)
-
-
-def _least_margin(run: Run) -> str:
+def _least_margin(learner: Mapping[str, Any], certificate: Mapping[str, Any]) -> str:
     """The margin that the feasible rewards have: half the largest that all states can have at once, as FiniteLP's own cap."""
     told = "half the largest that all states can have at once"
-    cap = run.certificate["proof"].get("margin_cap")
-    own = (run.config.get("learner") or {}).get("margin_cap") == "auto" and isinstance(cap, int | float)
+    cap = certificate["proof"].get("margin_cap")
+    own = learner.get("margin_cap") == "auto" and isinstance(cap, int | float)
     return f"{number(cap)}, {told}," if own else told
 
 

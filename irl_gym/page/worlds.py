@@ -33,14 +33,18 @@ def run_places(named: Mapping[str, Run]) -> dict[str, str]:
     given = {letter: dict(_given(run.config)) for letter, run in named.items()}
     told = {}
     for letter, run in named.items():
-        same = [given[other] for other, one in named.items() if page_title(one) == page_title(run)]
+        same = [
+            given[other]
+            for other, one in named.items()
+            if page_title(one.env_id, one.config) == page_title(run.env_id, run.config)
+        ]
         keys = [
             key
             for key in dict.fromkeys(key for one in same for key in one)
             if key in short or any(one.get(key) != same[0].get(key) for one in same)
         ]
         differing = ", ".join(f"{key}={written(given[letter][key])}" for key in keys if key in given[letter])
-        told[letter] = page_title(run) + (f" ({differing or 'no arguments'})" if keys else "")
+        told[letter] = page_title(run.env_id, run.config) + (f" ({differing or 'no arguments'})" if keys else "")
     return told
 
 
@@ -51,15 +55,15 @@ def _given(config: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     yield from ((key, rest[key]) for key in (*WORLD, *_dataset(config)) if rest.get(key) not in (None, [], {}, 0, "known"))
 
 
-def run_title(run: Run, place: str) -> str:
+def run_title(config: Mapping[str, Any], place: str) -> str:
     """Environment, learner and seed."""
-    learner = (run.config.get("learner") or {}).get("type", "")
-    return f"{place}, {learner}, seed {run.config.get('seed')}"
+    learner = (config.get("learner") or {}).get("type", "")
+    return f"{place}, {learner}, seed {config.get('seed')}"
 
 
 def one_world(named: Mapping[str, Run]) -> bool:
     """Are all runs of the same environment, and is the same made of it, so that their values can be compared?"""
-    return len({(page_title(run), _world(run.config)) for run in named.values()}) == 1
+    return len({(page_title(run.env_id, run.config), _world(run.config)) for run in named.values()}) == 1
 
 
 def _world(config: Mapping[str, Any]) -> str:

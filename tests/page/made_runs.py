@@ -19,13 +19,27 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.linear_reward import LinearReward
 from irl_gym.metrics import agreement, optimal_actions, policy_value, random_value, worst_tie
 from irl_gym.names import action_names, state_name
+from irl_gym.needs import supplied
 from irl_gym.optimality import certify
+from irl_gym.page.contents import Contents
 from irl_gym.page.verdict import verdict
 from irl_gym.runs import Run
 from irl_gym.tabulate import tabulate
 
 SCRIPT = ["python", "scripts/recover_and_retrain.py"]
 NO_CURVE = Curve(*np.zeros((5, 0)))
+
+
+def scene_of(run):
+    """What is known of a run state by state."""
+    found = Contents(run).scene
+    assert found is not None
+    return found
+
+
+def section_of(show, run, **changed):
+    """A section of a run's page."""
+    return supplied(show, Contents(run), run, **changed)
 
 
 def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=False, reward_on="state", films=True, **kwargs):

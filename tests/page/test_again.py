@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page.made_runs import stepped_run
+from page.made_runs import section_of, stepped_run
 
 from irl_gym.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.counting import Counting, Interaction
@@ -74,7 +74,7 @@ def test_settings_left_as_they_are_are_not_listed():
 )  # fmt: skip
 def test_what_a_configuration_does_not_hold_is_named(tmp_path, asked, absent):
     (found,) = missing(asked.to_json())
-    section = reproduce(replace(stepped_run(tmp_path), config=asked.to_json()))
+    section = section_of(reproduce, replace(stepped_run(tmp_path), config=asked.to_json()))
     assert found.startswith(absent) and absent in section.lead and "cannot make it again" in section.lead
     assert "=..." in section.shown["command"] or ": ..." in section.shown["command"]
     compile(section.shown["command"], "lines", "exec")
@@ -86,11 +86,11 @@ def test_a_learner_of_the_users_own_is_named():
 
 
 def test_a_run_from_python_says_so(tmp_path):
-    assert reproduce(stepped_run(tmp_path)).lead.startswith("The run was started from Python. These lines")
+    assert section_of(reproduce, stepped_run(tmp_path)).lead.startswith("The run was started from Python. These lines")
 
 
 def test_a_run_of_an_earlier_version_does_not_say_that_it_was_started_from_python(tmp_path):
-    lead = reproduce(replace(stepped_run(tmp_path), version={})).lead
+    lead = section_of(reproduce, replace(stepped_run(tmp_path), version={})).lead
     assert "started from Python" not in lead and "An earlier version of irl_gym made the run" in lead
 
 
@@ -103,4 +103,5 @@ def test_keys_of_a_strangers_configuration_are_not_written_as_python():
 def test_a_command_of_another_program_is_shown_as_one(tmp_path):
     run = stepped_run(tmp_path)
     theirs = replace(run, version={**run.version, "command": ["rm", "-rf", "all"]})
-    assert "another program than irl_gym" in reproduce(theirs).lead and "another program" not in reproduce(run).lead
+    assert "another program than irl_gym" in section_of(reproduce, theirs).lead
+    assert "another program" not in section_of(reproduce, run).lead

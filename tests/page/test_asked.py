@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from page.made_runs import table_run, verdict_of
+from page.made_runs import section_of, table_run, verdict_of
 
 from irl_gym.page.asked import asked, typed
 from irl_gym.page.proof import doctor, finding
@@ -27,12 +27,12 @@ def test_flags_with_underscores_are_read_as_the_help_spells_them():
 def test_the_bare_command_lists_the_environment_alone(tmp_path):
     run = table_run(tmp_path, films=False)
     bare = replace(run, version={**run.version, "command": [*SCRIPT]})
-    assert asked(bare).shown["lines"] == [("environment", "FrozenLake-v1")]
+    assert section_of(asked, bare).shown["lines"] == [("environment", "FrozenLake-v1")]
 
 
 def test_a_run_from_python_lists_what_differs_from_its_defaults(tmp_path):
     run = table_run(tmp_path, films=False, seed=4)
-    lines = dict(asked(replace(run, version={**run.version, "command": None})).shown["lines"])
+    lines = dict(section_of(asked, replace(run, version={**run.version, "command": None})).shown["lines"])
     assert lines["seed"] == "4" and lines["gamma"] == "0.9"
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from gymnasium import spaces
-from page.made_runs import table_run
+from page.made_runs import scene_of, table_run
 
 from irl_gym.cells import Cells
 from irl_gym.coordinates import Coordinates
@@ -13,7 +13,6 @@ from irl_gym.page.compared import reward_panel
 from irl_gym.page.comparison import SCRIPTS
 from irl_gym.page.document import write_page
 from irl_gym.page.maps import Map
-from irl_gym.page.scene import Scene
 from irl_gym.page.sections import Section, specs
 
 NAMES = ("up", "right", "down", "left", "<b>wait")
@@ -141,6 +140,6 @@ def test_letters_leave_the_middle_of_a_cell_to_staying(directions, off):
 
 
 def test_the_reward_of_steps_of_a_run_names_the_moves(tmp_path):
-    scene = Scene.of(table_run(tmp_path, "CliffWalking-v1", reward_on="state-action", films=False))
+    scene = scene_of(table_run(tmp_path, "CliffWalking-v1", reward_on="state-action", films=False))
     spec = reward_panel("true", "True", scene.table.reward, scene).spec()
     assert spec["fields"] == [["", "up", ""], ["left", "", "right"], ["", "down", ""]]

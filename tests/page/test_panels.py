@@ -2,18 +2,15 @@
 
 import numpy as np
 import pytest
-from page.made_runs import table_run
+from page.made_runs import scene_of, table_run
 
 from irl_gym.page.compared import reward_panel, values
 from irl_gym.page.panels import bars, grouped_bars, named
-from irl_gym.page.scene import Scene
 
 
 @pytest.fixture(scope="module")
 def cards(tmp_path_factory):
-    found = Scene.of(table_run(tmp_path_factory.mktemp("cards"), "Blackjack-v1", errors=20, films=False, sab=False))
-    assert found is not None
-    return found
+    return scene_of(table_run(tmp_path_factory.mktemp("cards"), "Blackjack-v1", errors=20, films=False, sab=False))
 
 
 def drawn(names, **more):

@@ -4,23 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page.made_runs import table_run
+from page.made_runs import scene_of, section_of, table_run
 
 from irl_gym.metrics import agreement, optimal_actions, policy_value
 from irl_gym.page.compared import policies
-from irl_gym.page.scene import Scene
 from irl_gym.page.training import widths
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     return table_run(tmp_path_factory.mktemp("run"), errors=3, films=False)
-
-
-def scene_of(run):
-    found = Scene.of(run)
-    assert found is not None
-    return found
 
 
 def share(scene):
@@ -55,7 +48,7 @@ def test_what_a_state_loses_is_0_where_the_agent_acts_best(run):
 
 def test_widths_of_steps_are_those_of_the_expert_s_step(run):
     width = np.where(scene_of(run).acting[:, None], np.arange(64.0).reshape(16, 4), np.nan)
-    section = widths(scene_of(replace(run, widths={"low": -width, "high": width * 0, "width": width})))
+    section = section_of(widths, replace(run, widths={"low": -width, "high": width * 0, "width": width}))
     drawn = np.array(section.panels[0].figure.data[1].z, dtype=float).ravel()
     shown = ~np.isnan(drawn)
     np.testing.assert_array_equal(drawn[shown], width[np.arange(16), run.expert][shown])

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page.made_runs import stepped_run, table_run, verdict_of
+from page.made_runs import scene_of, section_of, stepped_run, table_run, verdict_of
 
 from irl_gym.claims import into_folder
+from irl_gym.page.absent import absent
 from irl_gym.page.compared import policies, values
 from irl_gym.page.comparison import write_comparison
 from irl_gym.page.episodes import episodes
-from irl_gym.page.proof import certificate, doctor
-from irl_gym.page.scene import Scene
+from irl_gym.page.proof import doctor, proved
 from irl_gym.page.slider import lambda_slider
 from irl_gym.page.training import widths
 from irl_gym.page.verdict import policies_table
@@ -30,20 +30,14 @@ def cards(tmp_path_factory):
     return table_run(tmp_path_factory.mktemp("cards"), "Blackjack-v1", errors=20, films=False, sab=False)
 
 
-def scene_of(run):
-    found = Scene.of(run)
-    assert found is not None
-    return found
-
-
 def test_the_feasible_set_is_told_with_its_margin(lake):
-    lead = widths(scene_of(lake)).lead
+    lead = section_of(widths, lake).lead
     assert "within +-1" in lead and f"at least {lake.certificate['proof']['margin_cap']:.4f}" in lead
 
 
 def test_the_margin_has_no_number_where_the_run_had_another_cap(lake):
     other = {**lake.config, "learner": {**lake.config["learner"], "margin_cap": None}}
-    lead = widths(scene_of(replace(lake, config=other))).lead
+    lead = section_of(widths, replace(lake, config=other)).lead
     assert "at least half the largest that all states can have at once" in lead
 
 
@@ -63,17 +57,16 @@ def test_the_order_of_states_is_a_number(cards):
     assert "Where the cloud rises" in caption and "Rank correlation: " in caption
 
 
-@pytest.mark.parametrize("section", [widths, lambda scene: lambda_slider(scene)[0]])
-def test_what_is_too_large_is_told_in_a_sentence(lake, section):
-    told = {**lake.stages, "ambiguity": {"no_ambiguity": "there are 900 states to act in: it is worked out for at most 500"}}
-    lead = section(scene_of(replace(lake, widths=None, lambda_path=None, stages=told))).lead
+@pytest.mark.parametrize("need", ["widths", "lambda_path"])
+def test_what_is_too_large_is_told_in_a_sentence(need):
+    told = {"ambiguity": {"no_ambiguity": "there are 900 states to act in: it is worked out for at most 500"}}
+    lead = absent(need, told).lead
     assert "was not worked out for this run. There are 900 states to act in" in lead and lead.endswith("at most 500.")
 
 
 def test_the_slider_calls_states_as_figures_do(lake):
     path = {**lake.lambda_path, "changes": [{"sentence": "At price 1 the reward of states 4, 14 becomes 0."}] * 7}
-    _, data = lambda_slider(scene_of(replace(lake, lambda_path=path)))
-    assert data is not None
+    data = section_of(lambda_slider, replace(lake, lambda_path=path)).script["slider"]
     assert data["pieces"][0]["change"] == "At price 1 the reward of (row 1, column 0) and (row 3, column 2) becomes 0."
 
 
@@ -94,7 +87,7 @@ def test_a_score_has_one_form(lake):
 
 
 def test_the_certificate_tells_the_facts_of_the_reward_and_those_of_its_program(lake):
-    of_reward, of_program = certificate(lake).shown["parts"]
+    of_reward, of_program = section_of(proved, lake).shown["parts"]
     assert of_reward["title"] == "Of the reward: computed again for this page"
     assert of_program["title"] == "Of its program: the run's own record"
     assert dict(of_program["lines"])["objective of the program"].endswith("to rounding the best possible")
@@ -111,7 +104,7 @@ def test_facts_are_text_and_never_markup(lake, tmp_path):
 
 def test_why_there_are_no_pictures_is_a_sentence(lake):
     film = replace(lake.films["agent"], without_frames="the environment draws none")
-    section, _ = episodes(replace(lake, films={"agent": film}), scene_of(lake))
+    section = episodes({"agent": film}, None)
     assert section.shown["players"][0]["why"] == "The environment draws none."
 
 

@@ -20,7 +20,6 @@ from irl_gym.metrics import optimal_actions
 from irl_gym.names import Names, action_names, state_name
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
-from irl_gym.run_reader import understood
 from irl_gym.states import StateIndex
 from irl_gym.worlds import SteppedWorld, TableWorld
 
@@ -33,12 +32,9 @@ RETURNS = 100
 
 def draw(loop: "Loop", folder: Path) -> None:
     """Draw rewards, values, policies and the learning curve as PNG; where there is no table, returns and the curve."""
-    with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
-        levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
-        curve = learning_curve(loop)
-        pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else {}
-    if isinstance(loop.world, SteppedWorld):  # not in there: what the environment raises is no fault of the files
-        pictures = _of_steps(loop, loop.world)
+    levels = {name: loop.folder_metrics["policies"][name]["value"] for name in ("expert", "random")}
+    curve = learning_curve(loop)
+    pictures = _of_table(loop, loop.world) if isinstance(loop.world, TableWorld) else _of_steps(loop, loop.world)
     if curve.steps.size:  # exact planning has none
         pictures["learning_curve.png"] = plotting.draw_learning_curve(
             {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}, **levels

@@ -15,7 +15,7 @@ import numpy as np
 from irl_gym.ambiguity.lambda_path import lambda_path
 from irl_gym.ambiguity.widths import feasible_widths
 from irl_gym.diagnoses.case import Case
-from irl_gym.diagnosis import diagnose, weights_of
+from irl_gym.diagnosis import Diagnosis, diagnose, weights_of
 from irl_gym.errors import IrlGymError
 from irl_gym.figures import layout_of
 from irl_gym.filming import film
@@ -25,8 +25,8 @@ from irl_gym.metrics_csv import write_metrics_csv
 from irl_gym.page.report import write_report
 from irl_gym.page.slider import MOST_PIECES
 from irl_gym.run_folder import write_json
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
+from irl_gym.status import Status
 from irl_gym.worlds import TableWorld
 
 if TYPE_CHECKING:
@@ -59,14 +59,14 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
     """Write what the doctor says; for small tables how wide the feasible set is and how the reward depends on lambda.
 
     Size decides, not time, so that the same seed leaves the same files. An examination that fails does not undo the run:
-    the record says why.
+    the diagnosis or the record says why.
     """
     told: dict[str, Any] = {}
     try:
-        with understood(loop.folder.path):  # a run that is continued may have been changed meanwhile
-            write_json(folder / "diagnosis.json", diagnose(_case(loop)).to_json())
+        found = diagnose(_case(loop))
     except IrlGymError as error:
-        told["no_diagnosis"] = f"{type(error).__name__}: {error}"
+        found = Diagnosis((), "", f"the examination failed ({type(error).__name__}: {error})")
+    write_json(folder / "diagnosis.json", found.to_json())
     why = _too_much(loop)
     if why is not None:
         return told | {"no_ambiguity": why}
@@ -74,8 +74,7 @@ def ambiguity(loop: "Loop", folder: Path) -> dict[str, Any]:
     assert isinstance(loop.world, TableWorld)  # or there is too much
     for name, examine in (("widths", _widths), ("path", _path)):
         try:
-            with understood(loop.folder.path):
-                arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
+            arrays |= {f"{name}.{key}": value for key, value in examine(loop, loop.world.table.mdp).items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
     np.savez(folder / "ambiguity.npz", **arrays)
@@ -86,7 +85,7 @@ def _case(loop: "Loop") -> Case:
     """The evidence that the doctor works on, of a table or, without one, of the certificate alone."""
     made = loop.stage("reward")
     without = Case(
-        claims=loop.certificate, status=made["status"], stats=made["stats"], judged=loop.folder_metrics,
+        claims=loop.certificate, status=Status(made["status"]), stats=made["stats"], judged=loop.folder_metrics,
         weights=weights_of(loop.learned),
     )  # fmt: skip
     if not isinstance(loop.world, TableWorld):
@@ -139,6 +138,5 @@ def _path(loop: "Loop", mdp: TabularMDP) -> dict[str, np.ndarray]:
 def report(loop: "Loop", folder: Path) -> dict[str, Any]:
     """Write the page, from what is on disk; the table is at hand."""
     table = loop.world.table if isinstance(loop.world, TableWorld) else None
-    with understood(loop.folder.path):
-        write_report(read_run(loop.folder.path, table), folder / "report.html")
+    write_report(read_run(loop.folder.path, table), folder / "report.html")
     return {}

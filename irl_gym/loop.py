@@ -43,6 +43,7 @@ from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.logs import log_scalars, logged
+from irl_gym.metrics_schema import Certificate, Metrics
 from irl_gym.minari_files import dataset_name, unkept
 from irl_gym.places import place_of
 from irl_gym.planners import SB3, Agent, Planner
@@ -180,12 +181,12 @@ class Loop:
     @cached_property
     def certificate(self) -> dict[str, Any]:
         """The content of certificate.json."""
-        return self.folder.load("certificate.json", read_json)
+        return self.folder.load("certificate.json", lambda path: read_json(path, Certificate))
 
     @cached_property
     def folder_metrics(self) -> dict[str, Any]:
         """The content of metrics.json."""
-        return self.folder.load("metrics.json", read_json)
+        return self.folder.load("metrics.json", lambda path: read_json(path, Metrics))
 
     def _share(self, stage: str, planner: Planner) -> Callable[[int, Policy], None]:
         total = max(1, getattr(planner, "total_timesteps", 1))

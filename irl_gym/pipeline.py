@@ -13,7 +13,6 @@ from irl_gym.experiment import Experiment
 from irl_gym.loop import Loop, OnProgress
 from irl_gym.own_files import held
 from irl_gym.reveal import Reveal
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
 from irl_gym.worlds import TableWorld
 
@@ -89,8 +88,7 @@ def recover_and_retrain(
 
 def _read_again(loop: Loop) -> Mapping[str, Any]:
     """The metrics of a run that was finished before, which may have been changed since."""
-    with understood(loop.folder.path):
-        return read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None).metrics
+    return read_run(loop.folder.path, loop.world.table if isinstance(loop.world, TableWorld) else None).metrics
 
 
 def _shown(env: gym.Env) -> Mapping[str, int]:

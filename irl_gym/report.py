@@ -11,32 +11,29 @@ from rich.text import Text
 
 from irl_gym.claims import ENVIRONMENT
 from irl_gym.confirmation import loss_told
+from irl_gym.diagnoses.findings import told_answer
 from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import as_interval
 from irl_gym.optimality import AT_STAKE
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
-from irl_gym.run_reader import understood
+from irl_gym.run_schema import Diagnosed, Environment
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged
 from irl_gym.told_rewards import told_of_reward
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
 """Findings that say that what was given is not what it seems: they are told at once."""
+ANSWERS = {"healthy": "green", "findings": "yellow", "not examined": "yellow"}
+"""Of what the doctor says."""
 COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 """Of a score and a mean return, by how both are judged."""
 
 
 def print_report(report: Report, console: Console) -> None:
-    """Print what a run found; brackets and colons in names are no markup.
-
-    Raises:
-        RunIncomplete: a run that was continued, and whose files say what no run says; then nothing is printed.
-    """
-    with understood(report.out):
-        parts = [*render(report)]
-    for part in parts:
+    """Print what a run found; brackets and colons in names are no markup."""
+    for part in [*render(report)]:
         console.print(part, markup=False, emoji=False)
 
 
@@ -56,16 +53,13 @@ def render(report: Report) -> Iterator[RenderableType]:
 
 
 def _doctor(report: Report) -> Iterator[RenderableType]:
-    """How much the doctor found, and what of it is about the expert that was given; nothing for a healthy run."""
-    diagnosis = report.out / "diagnosis.json"
-    findings = read_json(diagnosis)["findings"] if diagnosis.exists() else []
-    count = len(findings)
-    for one in findings:
-        if one.get("name") in ABOUT_THE_GIVEN:
+    """The doctor's answer, and what of it is about the expert that was given."""
+    diagnosis = read_json(report.out / "diagnosis.json", Diagnosed)
+    for one in diagnosis["findings"]:
+        if one["name"] in ABOUT_THE_GIVEN:
             yield Text(f"Warning: {one['sentence']} {one['mend']}", "yellow")
-    if count:
-        things = "1 thing" if count == 1 else f"{count} things"
-        yield Text(f"The doctor found {things}: python scripts/doctor.py --run {shlex.quote(str(report.out))}")
+    more = f" python scripts/doctor.py --run {shlex.quote(str(report.out))}" if diagnosis["findings"] else ""
+    yield Text(f"The doctor: {told_answer(diagnosis)}{more}", ANSWERS[diagnosis["answer"]])
 
 
 def _asked(report: Report) -> str:
@@ -93,7 +87,7 @@ def _lost(report: Report) -> Iterator[RenderableType]:
 def _recorded_in(report: Report) -> str:
     """The id of the environment that a dataset brought with it, where it has one."""
     kept = report.out / ENVIRONMENT
-    found = read_json(kept).get("id") if kept.exists() else None
+    found = read_json(kept, Environment)["id"] if kept.exists() else None
     return f"{found}, " if found else ""
 
 

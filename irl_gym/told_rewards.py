@@ -7,6 +7,7 @@ from irl_gym.optimality import told_record
 from irl_gym.page.compared import DISTANCES
 from irl_gym.sampling_error import estimated_table
 from irl_gym.shares import MUCH
+from irl_gym.status import Status
 
 ROUNDING = 1e-12
 """A distance from the best possible up to this is none."""
@@ -16,8 +17,8 @@ HARM = 1e-6
 
 def told_of_reward(reward: Mapping[str, Any], metrics: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """What is said of the reward, line by line: what all learners know, then what each one's certificate knows."""
-    if not reward["status"].startswith("Optimal"):
-        yield "status", reward["status"]
+    if (status := Status(reward["status"])) is not Status.OPTIMAL:
+        yield "status", status.sentence
     best = f"yes, against {reward['rounds'] + 1} policies" if "fell_short" in reward else "yes"
     seen = metrics["demonstrations"]["episodes_only"] and "fell_short" not in reward
     judged = "; judged are the actions most frequent in its episodes" if seen else ""

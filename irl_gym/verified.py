@@ -36,7 +36,6 @@ from irl_gym.metrics import agreement, policy_value
 from irl_gym.optimality import Loss, loss_on
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import SURPRISES
 from irl_gym.scores import Scale
 from irl_gym.tabulation import Tabulation
 
@@ -160,7 +159,7 @@ def recomputed(
         raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
     try:
         known = seen_with_noise(path, table) if config.get("epsilon") else expert
-    except (IrlGymError, OSError, *SURPRISES):
+    except (IrlGymError, OSError):
         return None
     now, low, high = loss_under(table.mdp, known, reward), record.get("loss_low"), record.get("loss_bound")
     if record.get("learner") not in JUDGED_BY_LOSS:

@@ -12,7 +12,18 @@ from irl_gym.evaluation import settled_at
 from irl_gym.pipeline import Report
 from irl_gym.report import print_report
 
+FOUND = {
+    "name": "blind-expert", "sentence": "The expert returns 110 here.", "mend": "Give the statistics.", "states": [],
+    "actions": [], "flags": [],
+}  # fmt: skip
 CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
+
+
+def doctored(out, *findings, **changes):
+    """What the doctor says."""
+    answer = "findings" if findings else "healthy"
+    told = {"answer": answer, "why": None, "examined": "Examined: it.", "findings": findings} | changes
+    (out / "diagnosis.json").write_text(json.dumps(told))
 
 
 def said(
@@ -22,7 +33,7 @@ def said(
     """What is printed of a run of FiniteLP with these numbers, on one line."""
     row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
     told = {
-        "learner": "FiniteLP", "status": "Optimal within the solver's tolerances.", "expert_optimal": True, "degenerate": False,
+        "learner": "FiniteLP", "status": "optimal", "expert_optimal": True, "degenerate": False,
         "worst_tie_regret": 0.0, "worst_tie_regret_share": share, "lambda_0": 2.0, "l1": 0.0, "margin_cap": 1.0,
         "duality_gap": 0.0, "least_l1_norm": 3.0, "l1_norm": 3.0, "marginless_states": 0, "violated_states": 0,
         "inseparable_states": 0, "zero": False, "reward_on": "state",
@@ -38,6 +49,9 @@ def said(
     }  # fmt: skip
     asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
     stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
+    out.mkdir(parents=True, exist_ok=True)
+    if not (out / "diagnosis.json").exists():
+        doctored(out)
     console = Console(file=io.StringIO(), width=250, force_terminal=coloured, color_system="standard" if coloured else None)
     print_report(Report(out, metrics, {}, stages, asked | (config or {}), {}), console)
     return " ".join(console.file.getvalue().split())
@@ -95,14 +109,20 @@ def test_an_expert_that_is_beaten_is_told_with_the_noise(tmp_path, error, words)
     assert words in text
 
 
-def test_a_healthy_run_does_not_mention_the_doctor(tmp_path):
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": []}))
-    assert "doctor" not in said(tmp_path)
+def test_a_healthy_run_is_called_so(tmp_path):
+    text = said(tmp_path)
+    assert "The doctor: Healthy. Open" in text
 
 
 def test_an_unhealthy_run_names_the_doctor(tmp_path):
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [{}]}))
-    assert f"The doctor found 1 thing: python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
+    doctored(tmp_path, FOUND)
+    assert f"The doctor: 1 finding. python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
+
+
+def test_a_run_that_could_not_be_examined_is_not_called_healthy(tmp_path):
+    doctored(tmp_path, answer="not examined", why="it is gone")
+    text = said(tmp_path)
+    assert "The doctor: Not examined: it is gone. Open" in text and "ealthy" not in text
 
 
 def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
@@ -113,13 +133,12 @@ def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
 
 
 def test_what_is_wrong_with_the_given_expert_is_told_at_once(tmp_path):
-    found = {"name": "blind-expert", "sentence": "The expert returns 110 here.", "mend": "Give the statistics."}
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [found]}))
+    doctored(tmp_path, FOUND)
     assert "Warning: The expert returns 110 here. Give the statistics." in said(tmp_path)
 
 
 def test_a_dataset_is_told_with_its_environment(tmp_path):
-    (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0"}))
+    (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0", "observations": "{}", "actions": []}))
     assert said(tmp_path, config={"env_id": None, "dataset": "me/two-v0"}).startswith("Lake-v0, the environment of me/two-v0;")
 
 
@@ -171,8 +190,8 @@ def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
 def test_names_are_printed_as_they_are_and_never_read_as_markup(tmp_path, name):
     policies = {"expert": {"score": None}, "random": {"score": None}, "retrained": {"score": None}}
     text = said(
-        tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies, status=f"it is {name}",
+        tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies,
         config={"env_kwargs": {"map": name}, "dataset": name},
     )  # fmt: skip
     assert f"/{name}: dataset, reward" in text and f"/{name}/report.html in a browser" in text
-    assert f"(map={name})" in text and f"There is no score: of {name}." in text and f"status │ it is {name}" in text
+    assert f"(map={name})" in text and f"There is no score: of {name}." in text

@@ -47,7 +47,7 @@ class IRLResult(Generic[AnyReward, AnyProof]):
     reward: AnyReward
     """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
     status: Status
-    """What became of the program, in a sentence."""
+    """What became of the program; `status.sentence` says it."""
     objective: float
     """The program's objective, recomputed from the reward."""
     certificate: AnyProof

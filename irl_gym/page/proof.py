@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 
 from irl_gym.confirmation import loss_told
+from irl_gym.diagnoses.findings import told_answer
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.estimated import errors_told
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.optimality import AT_STAKE, told_record
 from irl_gym.page.sections import Section
-from irl_gym.page.written import counted, number, percent, sentence_of, sum_of
+from irl_gym.page.written import counted, number, percent, sum_of
 from irl_gym.runs import Run
 from irl_gym.sampling_error import estimated_table
 from irl_gym.scores import score_of
 from irl_gym.shares import MUCH, judged, returns_of
+from irl_gym.status import Status
 
 UNKNOWN = "one episode tells no noise"
 """In place of a standard error that there is none of."""
@@ -166,7 +168,7 @@ def certificate(run: Run) -> Section:
 def _lines(run: Run) -> Iterator[tuple[str, str]]:
     """Terms and what they are, for whichever learner's certificate it is."""
     reward, held = run.metrics["reward"], run.certificate
-    yield "Status of the program", str(reward.get("status", "not recorded in this version"))
+    yield "Status of the program", Status(reward["status"]).sentence
     optimal = told_record(reward) or ("yes" if reward["expert_optimal"] else _why_not(reward))
     yield "Expert optimal under the reward", optimal
     if "on_table" in reward:
@@ -242,24 +244,21 @@ def _noise(error: float | None) -> str:
 
 
 def doctor(run: Run) -> Section:
-    """The doctor's findings with their mends."""
-    title = "Doctor"
+    """The doctor's answer, and findings with their mends."""
     if run.diagnosis is None:
-        why = sentence_of(run.stages.get("ambiguity", {}).get("no_diagnosis"))
-        return Section("doctor", title, f"The doctor did not look at this run. {why}".strip())
-    findings = [finding(run, one) for one in run.diagnosis.get("findings", ())]
-    lead = "What a careful reader would ask of this reward, and what to do about it."
-    if not findings:
-        lead = f"The doctor has nothing to complain about. {sentence_of(run.diagnosis.get('examined'))}".strip()
-    return Section("doctor", title, lead, (), "doctor", {"findings": findings})
+        return Section("doctor", "Doctor", "The doctor did not look at this run: an earlier version of irl_gym made it.")
+    findings = [finding(run, one) for one in run.diagnosis["findings"]]
+    lead = "What a careful reader would ask of this reward, and what to do about it. " if findings else ""
+    lead += f"{told_answer(run.diagnosis)} {run.diagnosis['examined']}"
+    return Section("doctor", "Doctor", lead.strip(), (), "doctor", {"findings": findings})
 
 
 def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
     """A finding as diagnosis.json holds it, in words: states and actions by their names, and its mend with flags."""
-    sentence, mend = str(found.get("sentence", "")), str(found.get("mend", ""))
-    flags = usable_flags(found.get("flags") or (), given=run.config.get("dataset") is not None)
+    sentence, mend = found["sentence"], found["mend"]
+    flags = usable_flags(found["flags"], given=run.config.get("dataset") is not None)
     return {
-        "name": str(found.get("name", "")).replace("_", " ").replace("-", " "),
+        "name": found["name"].replace("-", " "),
         "sentence": sentence if run.table is None else with_names(sentence, run.state_name, run.actions),
         "mend": f"{mend} On the command line: {', '.join(flags)}." if flags else mend,
     }

@@ -42,7 +42,9 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     (copied / "run" / "metrics.json").write_text(json.dumps({"policies": [], "table": {"states": 16}, "reward": "good"}))
     made = script(name, "--run", "run", cwd=copied)
     assert "Traceback" not in made.stderr and made.stderr.count("\n") <= 1
-    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: run cannot be understood")
+    assert made.returncode == 2 and made.stderr.startswith(
+        "RunIncomplete: run is incomplete: metrics.json cannot be read (DamagedFile: its policies is []"
+    )
 
 
 def test_a_page_that_cannot_be_written_gets_one_clear_line(script, planned, tmp_path):

@@ -16,7 +16,7 @@ import numpy as np
 
 from irl_gym.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.diagnoses.case import Case
-from irl_gym.diagnoses.evidence import ENOUGH, ENOUGH_WITHOUT_TABLE, Evidence, lacking, missed
+from irl_gym.diagnoses.evidence import Evidence, missed, too_little
 from irl_gym.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.diagnoses.findings import Finding as Finding
 from irl_gym.diagnoses.findings import counted
@@ -139,8 +139,9 @@ def diagnose(case: Case) -> Diagnosis:
     if case.mdp is not None and case.true is not None:
         case.true.expected(case.mdp)
     found = [check(case) for check in CHECKS]
-    why = lacking(case, ENOUGH_WITHOUT_TABLE if case.mdp is None else ENOUGH)
-    return Diagnosis(tuple(one for one in found if one is not None), f"{_examined(case)} {missed(case, CHECKS)}".strip(), why)
+    return Diagnosis(
+        tuple(one for one in found if one is not None), f"{_examined(case)} {missed(case, CHECKS)}".strip(), too_little(case)
+    )
 
 
 def _examined(case: Case) -> str:

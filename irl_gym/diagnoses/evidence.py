@@ -7,10 +7,6 @@ from irl_gym.diagnoses.case import SMALL, Case
 
 Evidence = Literal["certificate", "metrics", "expert", "reward", "true", "programs"]
 """The last four take a table, and "programs" one that is small enough to solve some again."""
-ENOUGH: tuple[Evidence, ...] = ("reward", "expert")
-"""What it takes to call a reward in a table healthy."""
-ENOUGH_WITHOUT_TABLE: tuple[Evidence, ...] = ("certificate",)
-"""And one without: what the learner certified of the samples that it had."""
 
 
 def lacking(case: Case, needs: Sequence[Evidence]) -> str | None:
@@ -29,6 +25,18 @@ def lacking(case: Case, needs: Sequence[Evidence]) -> str | None:
             "programs": None if case.small else f"programs are solved again for at most {SMALL:,} reachable states",
         }
     return next((why for one in needs if (why := told[one]) is not None), None)
+
+
+def too_little(case: Case) -> str | None:
+    """Why a reward in which nothing is found cannot be called healthy, in words; None where it can.
+
+    In a table that takes the reward and an expert; without one a certificate by which the expert is best under the reward.
+    """
+    if case.mdp is not None:
+        return lacking(case, ("reward", "expert"))
+    if case.claims.get("expert_optimal") is True and not case.claims.get("degenerate"):
+        return None
+    return "there is no table, and no certificate by which the expert is best under the reward, and not by a tie"
 
 
 def missed(case: Case, needs: Mapping[Any, Sequence[Evidence]]) -> str:

@@ -47,6 +47,27 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "arguments", "place"),
+    [
+        ("report", ("--run", "run"), "irl_gym.page.report.write_report"),
+        ("doctor", ("--run", "run"), "irl_gym.diagnosis.diagnose_run"),
+        ("compare", ("run", "run"), "irl_gym.page.comparison.write_comparison"),
+        ("doctor", ("--run", "run"), "irl_gym.runs.claims"),
+    ],
+)
+def test_a_defect_is_called_one_and_is_told_with_its_traceback(script, copied, monkeypatch, name, arguments, place):
+    def broken(*_):
+        raise KeyError("policies")
+
+    monkeypatch.setattr(place, broken)
+    made = script(name, *arguments, cwd=copied)
+    told = (
+        "This is a defect of irl_gym, not of your files: KeyError: 'policies'. Please report it with this traceback:\nTraceback"
+    )
+    assert made.returncode == 70 and made.stderr.startswith(told) and "in broken" in made.stderr
+
+
 def test_a_page_that_cannot_be_written_gets_one_clear_line(script, planned, tmp_path):
     made = script("report", "--run", planned / "plain", "--out", tmp_path / "none" / "a.html", cwd=tmp_path)
     assert made.returncode == 2 and f"there is no folder {tmp_path / 'none'}" in made.stderr and "Traceback" not in made.stderr

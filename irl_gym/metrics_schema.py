@@ -30,9 +30,14 @@ def _together(told: Any) -> Any:
         lacking = [other for other in others if one in told and other not in told]
         if lacking:
             raise ValueError(f"{lacking[0]} beside {one}")
+    return told
+
+
+def _gaps(told: Any) -> Any:
+    """Refuse a reward that is judged by sampled values without as many errors as gaps."""
     gaps, errors = told.get("gaps", ()), told.get("gap_errors", ())
-    if len(gaps) != len(errors) or ("gaps" in told and not gaps):
-        raise ValueError("as many gaps as gap_errors, and one at least")
+    if len(gaps) != len(errors) or ("regret" in told) is not bool(gaps):
+        raise ValueError("as many gaps as gap_errors, and one at least where there is a regret")
     return told
 
 
@@ -81,12 +86,19 @@ class Proof(TypedDict, total=False):
 class _Certificate(Proof, total=False):
     states: Count
     margin: list[Number | None]
-    gaps: Annotated[list[Number], Field(min_length=1)]
+    gaps: list[Number]
     gap_errors: list[Number | None]
     unbreakable_rows: list[Pair]
+    inseparable: list[Count]
+    marginless: list[Count]
+    unbreakable: list[Count]
+    unconstrained: list[Count]
+    unknown: list[Count]
+    unsettled: list[Count]
+    violated: list[Count]
 
 
-Certificate = Annotated[_Certificate, AfterValidator(_together)]
+Certificate = Annotated[_Certificate, AfterValidator(_together), AfterValidator(_gaps)]
 """certificate.json, of `Proof.to_json`."""
 
 

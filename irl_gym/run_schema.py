@@ -153,7 +153,7 @@ class Shown(Stage, Lost):
     no_environment: NotRequired[Text]
 
 
-class Program(TypedDict, total=False):
+class Program(TypedDict):
     """What is noted of one program, of `solvers.Answer`."""
 
     status: StatusName

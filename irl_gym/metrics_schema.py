@@ -52,8 +52,6 @@ def _of_learner(told: Any) -> Any:
 class Proof(TypedDict, total=False):
     """What is known of a reward, whichever learner it is of."""
 
-    expert_optimal: bool | None
-    degenerate: bool
     zero: bool
     expressible: bool
     fell_short: bool

@@ -128,10 +128,15 @@ class Start(TypedDict):
     sha256: NotRequired[dict[Text, Digest]]
 
 
-class Stage(Start):
-    """The record of any stage, of `RunFolder.run`."""
+class Timed(Start):
+    """The record of a stage, of `RunFolder.run`."""
 
     seconds: Annotated[Number, Field(ge=0)]
+
+
+class Stage(Timed):
+    """Of any stage."""
+
     environment_steps: NotRequired[Count]
 
 
@@ -183,16 +188,17 @@ class Learned(Stage):
 
 
 class Planned(Stage):
-    """Of the expert; and of the agent, which says its steps."""
+    """Of the expert."""
 
     planner: Text
     trained_return: NotRequired[Number | None]
     vecnormalize: NotRequired[bool]
 
 
-class Retrained(Planned):
+class Retrained(Timed):
     """Of the agent."""
 
+    planner: Text
     environment_steps: Count
 
 

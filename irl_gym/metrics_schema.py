@@ -82,6 +82,8 @@ class Proof(TypedDict, total=False):
 
 
 class _Certificate(Proof, total=False):
+    expert_optimal: bool | None
+    degenerate: bool
     states: Count
     margin: list[Number | None]
     gaps: list[Number]

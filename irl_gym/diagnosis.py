@@ -147,7 +147,7 @@ def diagnose(case: Case) -> Diagnosis:
 def _examined(case: Case) -> str:
     """What was looked at."""
     if case.mdp is None:
-        return f"Examined: what the learner certified of its samples{', and what episodes showed' if case.judged else ''}."
+        return f"Examined: what the learner certified{', and what episodes showed' if case.judged else ''}."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
     where += ", on a counted table" if case.counted else ""
     beyond = case.beyond.copy()

@@ -77,7 +77,7 @@ def test_questions_that_take_programs_are_not_asked_of_a_large_table(monkeypatch
 def test_a_reward_without_a_table_is_as_healthy_as_its_certificate():
     made = doctor(sampled(), None, None)
     table = sum(bool(set(needs) & {"expert", "reward", "true", "programs"}) for needs in CHECKS.values())
-    assert made.healthy and made.examined.startswith("Examined: what the learner certified of its samples.")
+    assert made.healthy and made.examined.startswith("Examined: what the learner certified.")
     assert f"{table}, as there is no table" in made.examined
 
 

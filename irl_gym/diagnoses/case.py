@@ -1,7 +1,6 @@
 """The evidence that the doctor works on, of a result in memory and of a run's folder alike.
 
-What follows from P, the expert and R is computed here again; of the certificate is taken only what it alone knows: the terms
-of the program, its bound, and sampled values.
+What follows from P, the expert and R is computed again; of the certificate only what it alone knows is taken.
 Axes: S states, A actions, n rows of (4) among the reachable states in which the expert is known.
 """
 

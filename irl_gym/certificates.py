@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from irl_gym.errors import DamagedFile
 from irl_gym.facts import Fact, facts_of
 from irl_gym.learners.base import IRLResult
 from irl_gym.linear_reward import LinearReward
+from irl_gym.metrics_schema import Certificate
 from irl_gym.optimality import Optimality, certify
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import read_json
@@ -70,12 +70,7 @@ def read_certificate(path: Path) -> dict[str, Any]:
     Raises:
         DamagedFile: it is something else, such as that of an earlier version.
     """
-    told = read_json(path)
-    if set(told) != {"optimality", "proof"} or not isinstance(told["proof"], dict):
-        found = ", ".join(map(repr, sorted(told)[:3]))
-        raise DamagedFile(f"it has {found:.90}: expected 'optimality' and 'proof', as this version of irl_gym writes")
-    if not isinstance(told["optimality"], dict | None):
-        raise DamagedFile(f"optimality is {told['optimality']!r:.60}: expected an object, or null where there is no table")
+    told = read_json(path, Certificate)
     facts_in(told)
     return told
 

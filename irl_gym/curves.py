@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from irl_gym.checks import LARGEST
 from irl_gym.intervals import mean_interval
 from irl_gym.own_files import write_bytes
 from irl_gym.sampling import Successors
@@ -66,6 +67,9 @@ def read_curve(path: Path) -> Curve:
     if tuple(heading) not in (COLUMNS, COLUMNS[:2]):
         raise ValueError(f"its columns are {heading}: expected {list(COLUMNS)}")
     numbers = np.array([[one or "nan" for one in line] for line in lines], dtype=np.float64).reshape(-1, len(heading))
+    steps, value = numbers[:, 0], numbers[:, 1]
+    if not (np.isfinite(numbers[:, :2]).all() and (np.diff(steps, prepend=0.0) >= 0).all()) or (abs(numbers) > LARGEST).any():
+        raise ValueError(f"it has the values {value[:9]} at the steps {steps[:9]}: expected numbers, and increasing steps")
     padded = np.full((len(numbers), len(COLUMNS)), np.nan)
     padded[:, : len(heading)] = numbers
     return Curve(*padded.T)

@@ -8,6 +8,7 @@ proof only for what that alone knows; a mend is tried where it is a program that
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,58 +17,60 @@ import numpy as np
 from irl_gym.certificates import claims_in
 from irl_gym.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.diagnoses.case import Case
+from irl_gym.diagnoses.evidence import Evidence, missed, too_little
 from irl_gym.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.diagnoses.findings import Finding as Finding
 from irl_gym.diagnoses.findings import counted
 from irl_gym.diagnoses.unfinished import left_behind, seen_with_noise
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, IrlGymError
 from irl_gym.learners.base import IRLResult
 from irl_gym.linear_reward import LinearReward
 from irl_gym.mdp import TabularMDP, checked_mdp
 from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.states import States
+from irl_gym.status import Status
 
 if TYPE_CHECKING:
     from irl_gym.runs import Run
 
-CHECKS: tuple[Callable[[Case], Finding | None], ...] = (
-    nothing.lambda_above_lambda_0,
-    nothing.zero_weights,
-    nothing.nothing_to_compare,
-    nothing.unexplained_expert,
-    nothing.no_reward,
-    nothing.zero_reward,
-    nothing.constant_reward,
-    weights.flat_weights,
-    sampled.inexpressible,
-    truth.blind_expert,
-    truth.poor_expert,
-    truth.few_episodes,
-    truth.unconfirmed,
-    ties.violated,
-    truth.lossy_ties,
-    ties.same_successors,
-    ties.avoidable_ties,
-    ties.unbreakable_ties,
-    ties.unsettled,
-    sampled.fell_short,
-    sampled.beaten,
-    sampled.drowned,
-    sampled.cut_short,
-    sampled.noisy_rows,
-    unseen.strays,
-    unseen.dropped_actions,
-    unseen.unseen_ends,
-    unseen.unvisited,
-    values.small_gamma,
-    values.gamma_near_one,
-    values.never_ends,
-    values.faint_margins,
-    solving.inaccurate,
-    solving.far_from_optimal,
-    solving.retried,
-)
-"""Every sentence, the most important first."""
+CHECKS: Mapping[Callable[[Case], Finding | None], tuple[Evidence, ...]] = {
+    nothing.lambda_above_lambda_0: ("certificate",),
+    nothing.zero_weights: ("certificate",),
+    nothing.nothing_to_compare: ("expert",),
+    nothing.unexplained_expert: ("expert", "programs"),
+    nothing.no_reward: ("expert", "programs"),
+    nothing.zero_reward: ("reward",),
+    nothing.constant_reward: ("reward",),
+    weights.flat_weights: (),
+    sampled.inexpressible: ("certificate",),
+    truth.blind_expert: ("metrics",),
+    truth.poor_expert: ("expert", "true"),
+    truth.few_episodes: ("metrics",),
+    truth.unconfirmed: ("metrics",),
+    ties.violated: ("expert", "reward"),
+    truth.lossy_ties: ("reward", "true"),
+    ties.same_successors: ("expert",),
+    ties.avoidable_ties: ("expert", "reward"),
+    ties.unbreakable_ties: ("expert", "reward"),
+    ties.unsettled: ("expert", "reward"),
+    sampled.fell_short: ("certificate",),
+    sampled.beaten: ("certificate",),
+    sampled.drowned: ("certificate",),
+    sampled.cut_short: ("certificate",),
+    sampled.noisy_rows: ("certificate",),
+    unseen.strays: ("expert", "reward"),
+    unseen.dropped_actions: ("metrics",),
+    unseen.unseen_ends: ("metrics",),
+    unseen.unvisited: ("expert",),
+    values.small_gamma: ("reward", "programs"),
+    values.gamma_near_one: ("expert", "reward"),
+    values.never_ends: ("expert", "reward"),
+    values.faint_margins: ("expert", "reward"),
+    solving.inaccurate: ("certificate",),
+    solving.far_from_optimal: ("certificate",),
+    solving.retried: ("certificate",),
+}
+"""Every sentence, the most important first, and the evidence without which it cannot be asked for."""
 
 
 def doctor(
@@ -108,7 +111,7 @@ def doctor(
         None if mdp is None else expert,
         None if reward is None or mdp is None else _tabular(reward, mdp, states),
         {} if learned is None else learned.proof.to_json(),
-        "" if learned is None else learned.status.value,
+        None if learned is None else learned.status,
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
         shaped,
@@ -137,13 +140,15 @@ def diagnose(case: Case) -> Diagnosis:
     if case.mdp is not None and case.true is not None:
         case.true.expected(case.mdp)
     found = [check(case) for check in CHECKS]
-    return Diagnosis(tuple(one for one in found if one is not None), _examined(case))
+    return Diagnosis(
+        tuple(one for one in found if one is not None), f"{_examined(case)} {missed(case, CHECKS)}".strip(), too_little(case)
+    )
 
 
 def _examined(case: Case) -> str:
     """What was looked at."""
     if case.mdp is None:
-        return "There is no table: only what the proof says was examined."
+        return f"Examined: what the learner proved{', and what episodes showed' if case.judged else ''}."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
     where += ", on a counted table" if case.counted else ""
     beyond = case.beyond.copy()
@@ -164,29 +169,22 @@ def diagnose_run(run: "Run") -> Diagnosis:
 
     Raises:
         InvalidReward, InvalidPolicy: files that do not belong together.
-        DatasetMissing: the demonstrations of an expert with noise are gone.
     """
-    reward: Mapping[str, Any] = run.stages.get("reward", {})
-    table, claims = run.table, claims_in(run.certificate)
+    reward, table, claims = run.stages["reward"], run.table, claims_in(run.certificate)
+    known = {"claims": claims, "status": Status(reward["status"]), "stats": reward["stats"], "judged": run.metrics}
+    without = Case(**known, weights=weights_of(run.learned))
     if table is None:
-        stats = reward.get("stats", {})
-        return diagnose(
-            Case(
-                claims=claims, status=reward.get("status", ""), stats=stats, judged=run.metrics, weights=weights_of(run.learned)
-            )
-        )
-    case = Case(
-        table.mdp,
-        seen_with_noise(run.path, table) if run.config.get("epsilon") else run.expert,
-        _tabular(run.learned, table.mdp, table.states),
-        claims,
-        reward.get("status", ""),
-        reward.get("stats", {}),
-        table.reward,
-        bool(run.config.get("shaping")),
-        run.metrics,
-        weights_of(run.learned),
-    )
+        return diagnose(without)
+    expert, gone = run.expert, None
+    if run.config.get("epsilon"):
+        try:
+            expert = seen_with_noise(run.path, table)
+        except (IrlGymError, OSError) as error:
+            expert, gone = None, f"what the expert was seen to do cannot be read any more ({error})"
+    case = replace(
+        without, mdp=table.mdp, expert=expert, reward=_tabular(run.learned, table.mdp, table.states), true=table.reward,
+        shaped=bool(run.config.get("shaping")), gone=gone,
+    )  # fmt: skip
     return diagnose(case)
 
 

@@ -24,7 +24,6 @@ from irl_gym.metrics import optimal_actions
 from irl_gym.names import Names, action_names, state_name
 from irl_gym.policies import as_distribution
 from irl_gym.rewards import TabularReward
-from irl_gym.run_reader import understood
 from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import World
 
@@ -32,26 +31,23 @@ RETURNS = 100
 """Episodes of each policy in the figure of returns."""
 
 
-def learning_curve(folder: Path, path: Path, curve: Curve, judged: Mapping[str, Any]) -> dict[str, Any]:
+def learning_curve(folder: Path, curve: Curve, judged: Mapping[str, Any]) -> dict[str, Any]:
     """What the agent was worth as it trained, between random actions and the expert; exact planning has no curve."""
     if not curve.steps.size:
         return {}
-    with understood(path):  # a run that is continued may have been changed meanwhile
-        levels = {name: judged["policies"][name]["value"] for name in ("expert", "random")}
+    levels = {name: judged["policies"][name]["value"] for name in ("expert", "random")}
     drawn = {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}
     return _kept(folder, {"learning_curve.png": plotting.draw_learning_curve(drawn, **levels)})
 
 
 def of_table(
-    folder: Path, path: Path, table: Tabulation, tabular: TabularReward, expert: np.ndarray, agent: np.ndarray,
-    layout: GridLayout | None, env: gym.Env, env_id: str | None,
+    folder: Path, table: Tabulation, tabular: TabularReward, expert: np.ndarray, agent: np.ndarray, layout: GridLayout | None,
+    env: gym.Env, env_id: str | None,
 ) -> dict[str, Any]:  # fmt: skip
     """Rewards, values and policies state by state."""
-    with understood(path):
-        usual = usual_observation(table.states)
-        names = Names(action_names(env), lambda row: state_name(env_id, table.states.decode(row), None, usual))
-        pictures = _pictures(table, tabular, expert, agent, layout, names)
-    return _kept(folder, pictures)
+    usual = usual_observation(table.states)
+    names = Names(action_names(env), lambda row: state_name(env_id, table.states.decode(row), None, usual))
+    return _kept(folder, _pictures(table, tabular, expert, agent, layout, names))
 
 
 def _kept(folder: Path, pictures: Mapping[str, plotting.Figure]) -> dict[str, Any]:

@@ -9,11 +9,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from irl_gym import run_schema
 from irl_gym.run_folder import read_json, write_text
 
 FORMAT = "irl_gym.Film/1"
-KINDS = ("webp", "png")
-"""Formats of pictures."""
 MOST_BYTES = 700_000
 """Of the pictures of a film: they are made smaller until they fit, and a page leaves out what is still too much."""
 
@@ -78,13 +77,10 @@ def load_film(path: Path) -> Film:
     """Read a film that `Film.save` wrote; `path` is its json.
 
     Raises:
-        OSError, ValueError, KeyError, TypeError: a file is missing or holds something else.
+        OSError: a file is missing.
+        DamagedFile: it holds something else. The kind of its pictures is part of their names: it is one of two.
     """
-    told: Any = read_json(path)
-    if told["format"] != FORMAT:
-        raise ValueError(f"its format is {told['format']!r}: expected {FORMAT!r}")
-    if told["kind"] not in KINDS:  # it is part of a file's name: else a stranger's run could name any file
-        raise ValueError(f"its pictures are of the kind {told['kind']!r:.40}: expected one of {', '.join(KINDS)}")
+    told: Any = read_json(path, run_schema.Film)
     pictures = (path.with_suffix("") / f"{number:03d}.{told['kind']}" for number in range(told["frames"]))
     return Film(
         told["name"], told["seed"], tuple(Moment(**one) for one in told["steps"]), told["ends"],

@@ -20,7 +20,7 @@ from irl_gym.ambiguity.widths import feasible_widths
 from irl_gym.certificates import claims_in
 from irl_gym.demonstrations import Episode, seen_parts
 from irl_gym.diagnoses.case import Case
-from irl_gym.diagnosis import diagnose, weights_of
+from irl_gym.diagnosis import Diagnosis, diagnose, weights_of
 from irl_gym.errors import IrlGymError
 from irl_gym.filming import film
 from irl_gym.layouts import GridLayout
@@ -32,8 +32,8 @@ from irl_gym.page.report import write_report
 from irl_gym.page.slider import MOST_PIECES
 from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import write_json
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
+from irl_gym.status import Status
 from irl_gym.tabulation import Tabulation
 from irl_gym.worlds import World
 
@@ -72,26 +72,24 @@ def figures_as_csv(folder: Path, judged: Mapping[str, Any], env_id: str | None, 
 
 
 def diagnosis(
-    folder: Path, path: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward,
+    folder: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward,
     tabular: TabularReward | None, true: TabularReward | None, certificate: Mapping[str, Any], solved: Mapping[str, Any],
     shaping: bool, judged: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
-    """What the doctor says. An examination that fails does not undo the run: the record says why."""
+    """What the doctor says. An examination that fails does not undo the run: the diagnosis says why."""
+    status = Status(solved["status"])
+    case = Case(
+        mdp, known_expert, tabular, claims_in(certificate), status, solved["stats"], true, shaping, judged, weights_of(learned)
+    )
     try:
-        with understood(path):  # a run that is continued may have been changed meanwhile
-            case = Case(
-                mdp, known_expert, tabular, claims_in(certificate), solved["status"], solved["stats"], true, shaping, judged,
-                weights_of(learned),
-            )  # fmt: skip
-            write_json(folder / "diagnosis.json", diagnose(case).to_json())
+        found = diagnose(case)
     except IrlGymError as error:
-        return {"no_diagnosis": f"{type(error).__name__}: {error}"}
+        found = Diagnosis((), "", f"the examination failed ({type(error).__name__}: {error})")
+    write_json(folder / "diagnosis.json", found.to_json())
     return {}
 
 
-def feasible_set(
-    folder: Path, path: Path, learner: Learner, mdp: Any, known_expert: Any, certificate: Mapping[str, Any]
-) -> dict[str, Any]:
+def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, certificate: Mapping[str, Any]) -> dict[str, Any]:
     """For small tables how wide the feasible set is, and how the reward depends on lambda; why not, where it is not examined.
 
     Size decides, not time, so that the same seed leaves the same files.
@@ -102,8 +100,7 @@ def feasible_set(
     told, arrays = {}, {}
     for name, examine in (("widths", _widths), ("path", _path)):
         try:
-            with understood(path):
-                found = examine(learner, mdp, known_expert, certificate)
+            found = examine(learner, mdp, known_expert, certificate)
             arrays |= {f"{name}.{key}": value for key, value in found.items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
@@ -147,6 +144,5 @@ def _path(learner: Any, mdp: TabularMDP, expert: Any, certificate: Mapping[str, 
 
 def report(folder: Path, path: Path, table: Tabulation | None) -> dict[str, Any]:
     """The page, from what is on disk; the table is at hand."""
-    with understood(path):
-        write_report(read_run(path, table), folder / "report.html")
+    write_report(read_run(path, table), folder / "report.html")
     return {}

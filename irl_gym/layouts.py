@@ -50,12 +50,12 @@ class GridLayout:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any]) -> "GridLayout":
-        """The map that `to_json` wrote.
+        """The map that `to_json` wrote, in the shape of `run_schema.Grid`.
 
         Raises:
-            ValueError, KeyError, TypeError: it is something else.
+            ValueError: its parts are not of one size.
         """
-        rows, columns = (int(n) for n in told["shape"])
+        rows, columns = told["shape"]
         blocked, terminal = (np.array(told[name], dtype=bool).reshape(rows, columns) for name in ("blocked", "terminal"))
         letters = np.array(told["letters"], dtype="<U1").reshape(rows, columns)
         return cls((rows, columns), np.array(told["directions"], dtype=int).reshape(-1, 2), blocked, terminal, letters)

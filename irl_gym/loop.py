@@ -35,6 +35,7 @@ from irl_gym.demonstrations import EmpiricalPolicy, Episode
 from irl_gym.experiment import Experiment, as_config
 from irl_gym.learners.base import takes
 from irl_gym.linear_reward import LinearReward, check_savable, load_reward
+from irl_gym.metrics_schema import Metrics
 from irl_gym.needs import missing, part, supplied
 from irl_gym.places import place_of
 from irl_gym.planners import Planner
@@ -259,4 +260,4 @@ class Loop:
     @cached_property
     def judged(self) -> Mapping[str, Any]:
         """The content of metrics.json."""
-        return self.folder.load("metrics.json", read_json)
+        return self.folder.load("metrics.json", lambda path: read_json(path, Metrics))

@@ -13,7 +13,6 @@ from irl_gym.experiment import Experiment
 from irl_gym.loop import Loop
 from irl_gym.own_files import held
 from irl_gym.reveal import Reveal
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
 from irl_gym.stages import OnProgress
 from irl_gym.tabulation import Tabulation
@@ -91,9 +90,8 @@ def recover_and_retrain(
 
 def _read_again(path: Path, table: Tabulation | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """The metrics and the certificate of a run that was finished before, which may have been changed since."""
-    with understood(path):
-        run = read_run(path, table)
-        return run.metrics, run.certificate
+    run = read_run(path, table)
+    return run.metrics, run.certificate
 
 
 def _shown(env: gym.Env) -> Mapping[str, int]:

@@ -3,6 +3,7 @@
 import math
 import shlex
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, RenderableType
@@ -12,93 +13,85 @@ from rich.text import Text
 from irl_gym import measures
 from irl_gym.certificates import facts_in
 from irl_gym.claims import ENVIRONMENT
+from irl_gym.diagnoses.findings import told_answer
 from irl_gym.endings import LOST
 from irl_gym.estimated import errors_told
 from irl_gym.facts import Fact
 from irl_gym.measures import explained, no_score, shown
 from irl_gym.pipeline import Report
 from irl_gym.run_folder import read_json
-from irl_gym.run_reader import understood
+from irl_gym.run_schema import Diagnosed, Environment
 from irl_gym.scores import EXPERT, REFERENCES
 from irl_gym.shares import MUCH, judged, judgements
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
 """Findings that say that what was given is not what it seems: they are told at once."""
+ANSWERS = {"healthy": "green", "findings": "yellow", "not examined": "yellow"}
+"""Of what the doctor says."""
 COLOURS = {"good": "green", "open": "yellow", "bad": "red", "plain": ""}
 """Of the numbers of a policy, by how its score and mean return are judged."""
 
 
 def print_report(report: Report, console: Console) -> None:
-    """Print what a run found; brackets and colons in names are no markup.
-
-    Raises:
-        RunIncomplete: a run that was continued, and whose files say what no run says; then nothing is printed.
-    """
-    with understood(report.out):
-        parts = [*render(report)]
-    for part in parts:
+    """Print what a run found; brackets and colons in names are no markup."""
+    for part in [*render(report)]:
         console.print(part, markup=False, emoji=False)
 
 
 def render(report: Report) -> Iterator[RenderableType]:
     """The parts of the report, in reading order."""
-    yield _asked(report)
-    yield _policies(report)
-    yield from _lost(report)
-    yield _reward(report)
-    yield _stages(report)
-    yield f"Kept in {report.out}: dataset, reward, certificate, agent, metrics, figures and films."
+    out, metrics = report.out, report.metrics
+    yield _asked(report.config, report.shown, out)
+    yield _policies(metrics)
+    yield from _lost(metrics["demonstrations"])
+    yield _reward(report.certificate, metrics)
+    yield _stages(report.stages, metrics)
+    yield f"Kept in {out}: dataset, reward, certificate, agent, metrics, figures and films."
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
         yield Text(lost)
-    yield from _doctor(report)
+    yield from _doctor(out)
     yield f"Open {report.page} in a browser."
 
 
-def _doctor(report: Report) -> Iterator[RenderableType]:
-    """How much the doctor found, and what of it is about the expert that was given; nothing for a healthy run."""
-    diagnosis = report.out / "diagnosis.json"
-    findings = read_json(diagnosis)["findings"] if diagnosis.exists() else []
-    count = len(findings)
-    for one in findings:
-        if one.get("name") in ABOUT_THE_GIVEN:
+def _doctor(out: Path) -> Iterator[RenderableType]:
+    """The doctor's answer, and what of it is about the expert that was given."""
+    diagnosis = read_json(out / "diagnosis.json", Diagnosed)
+    for one in diagnosis["findings"]:
+        if one["name"] in ABOUT_THE_GIVEN:
             yield Text(f"Warning: {one['sentence']} {one['mend']}", "yellow")
-    if count:
-        things = "1 thing" if count == 1 else f"{count} things"
-        yield Text(f"The doctor found {things}: python scripts/doctor.py --run {shlex.quote(str(report.out))}")
+    more = f" python scripts/doctor.py --run {shlex.quote(str(out))}" if diagnosis["findings"] else ""
+    yield Text(f"The doctor: {told_answer(diagnosis)}{more}", ANSWERS[diagnosis["answer"]])
 
 
-def _asked(report: Report) -> str:
+def _asked(config: Mapping[str, Any], hidden: Mapping[str, int], out: Path) -> str:
     """Where and with which discount it was done, and what the environment was made to do."""
-    config = report.config
     made = ", ".join(f"{name}={value}" for name, value in config["env_kwargs"].items())
-    where = config["env_id"] or f"{_recorded_in(report)}the environment of {config['dataset']}"
+    where = config["env_id"] or f"{_recorded_in(out)}the environment of {config['dataset']}"
     told = [f"{where} ({made})" if made else where, f"gamma {config['gamma']:g}", f"seed {config['seed']}"]
     if config["start_seeds"]:
         told.append(f"layouts from the seeds {', '.join(map(str, config['start_seeds']))}")
-    if report.shown:
-        hidden = ", ".join(f"{name} ({n} values)" for name, n in report.shown.items())
-        told.append(f"shown beside the observation, since the environment hides it: {hidden}")
+    if hidden:
+        names = ", ".join(f"{name} ({n} values)" for name, n in hidden.items())
+        told.append(f"shown beside the observation, since the environment hides it: {names}")
     return "; ".join(told) + "."
 
 
-def _lost(report: Report) -> Iterator[RenderableType]:
+def _lost(told: Mapping[str, Any]) -> Iterator[RenderableType]:
     """What the dataset lacks, or what of it was not taken; nothing where that is nothing."""
-    told = report.metrics["demonstrations"]
     lost = [f"{told[key]:,} {words}" for key, words in LOST.items() if told.get(key)]
     if lost:
         yield f"Of the {told['episodes']:,} episodes learned from: {'; '.join(lost)}."
 
 
-def _recorded_in(report: Report) -> str:
+def _recorded_in(out: Path) -> str:
     """The id of the environment that a dataset brought with it, where it has one."""
-    kept = report.out / ENVIRONMENT
-    found = read_json(kept).get("id") if kept.exists() else None
+    kept = out / ENVIRONMENT
+    found = read_json(kept, Environment)["id"] if kept.exists() else None
     return f"{found}, " if found else ""
 
 
-def _policies(report: Report) -> Table:
-    metrics = report.metrics
+def _policies(metrics: Mapping[str, Any]) -> Table:
     rows, on_table = metrics["policies"], metrics["table"]
     columns = shown(measures.POLICIES, list(rows.values()))
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
@@ -113,16 +106,16 @@ def _policies(report: Report) -> Table:
     if rows[EXPERT]["score"] is None:
         told.append(f"There is no score: {no_score(metrics)}.")
     lines = [" ".join(told), *([f"table: {_table(on_table)}"] if on_table is not None else [])]
-    lines.append(f"judged: {judgements(rows, on_table)}{_of_training(report)}")
+    lines.append(f"judged: {judgements(rows, on_table)}{_of_training(metrics)}")
     table.caption = Text("\n".join(lines), "table.caption")
     table.caption_justify = "left"
     return table
 
 
-def _of_training(report: Report) -> str:
+def _of_training(metrics: Mapping[str, Any]) -> str:
     """Where every policy that is best under the reward is good, and the agent is not, what to do."""
-    table, share = report.metrics["table"], report.metrics["reward"].get("worst_tie_regret_share")
-    if judged(report.metrics["policies"], table).mood != "bad" or share is None or share > MUCH or not table["exact"]:
+    table, share = metrics["table"], metrics["reward"].get("worst_tie_regret_share")
+    if judged(metrics["policies"], table).mood != "bad" or share is None or share > MUCH or not table["exact"]:
         return ""
     least = math.floor(1000 * (1 - share)) / 1000
     told = f"Every policy that is best under the reward has a score of at least {least:.3f}"
@@ -139,29 +132,29 @@ def _table(table: Mapping[str, Any]) -> str:
     return f"{table['reachable']:,} reachable states, {table['actions']} actions. {' '.join(told)}"
 
 
-def _reward(report: Report) -> Table:
+def _reward(certificate: Mapping[str, Any], metrics: Mapping[str, Any]) -> Table:
     """What the reward says of the expert, what is measured of it, and what its learner proves."""
     table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
-    of_reward, of_program = facts_in(report.certificate)
-    lines = shown(measures.REWARDS, [report.metrics["reward"]])
-    measured = [Fact(one.heading, one.text(report.metrics["reward"])) for one in lines]
+    of_reward, of_program = facts_in(certificate)
+    lines = shown(measures.REWARDS, [metrics["reward"]])
+    measured = [Fact(one.heading, one.text(metrics["reward"])) for one in lines]
     for one in (*of_reward, *measured, *of_program):
-        table.add_row(one.label, Text(one.sentence, COLOURS[one.mood]))
-    table.caption = " ".join(explained(lines, report.metrics))
+        table.add_row(Text(one.label), Text(one.sentence, COLOURS[one.mood]))
+    table.caption = " ".join(explained(lines, metrics))
     table.caption_justify = "left"
     return table
 
 
-def _stages(report: Report) -> Table:
-    scored = report.metrics["policies"][EXPERT]["score"] is not None
-    crossing = report.metrics["training"].get("steps_to_0.99")
+def _stages(stages: Mapping[str, Mapping[str, Any]], metrics: Mapping[str, Any]) -> Table:
+    scored = metrics["policies"][EXPERT]["score"] is not None
+    crossing = metrics["training"].get("steps_to_0.99")
     table = Table(title="Stages", title_justify="left", title_style="bold")
     table.add_column("stage")
     table.add_column("seconds", justify="right")
     table.add_column("environment steps", justify="right")
-    for name, record in report.stages.items():
+    for name, record in stages.items():
         taken = record.get("environment_steps", 0)
         steps = f"{taken:,}" if taken else ""
         if name == "agent" and taken and scored:

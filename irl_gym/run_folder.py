@@ -10,20 +10,21 @@ a run.
 """
 
 import json
+import math
 import os
 import shutil
 import time
-import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from irl_gym.errors import RunConflict
+from irl_gym.errors import DamagedFile, RunConflict
 from irl_gym.own_files import LOCK, digest, scratch, write_bytes
+from irl_gym.run_schema import RECORDS_OF, Stage, checked
 
 NOT_THE_SAME = "is not the file that the run left, by its sha256: it was changed, damaged, or copied from another run"
-SURPRISES = (ArithmeticError, AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError)
-"""What is raised by content that no run leaves."""
+DEEPEST = 100
+"""Objects and lists inside each other."""
 RECORDS = ".stages"
 """Where the records of finished stages are, in the folder of a run."""
 
@@ -49,19 +50,44 @@ def write_json(path: Path, content: Any) -> None:
     write_text(path, json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n")
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """Read a json object.
+def read_json(path: Path, shape: Any = dict[str, Any]) -> dict[str, Any]:
+    """Read a json object of plain text and finite numbers.
+
+    Args:
+        path: the file.
+        shape: what it holds, of `run_schema` or `metrics_schema`.
 
     Raises:
-        ValueError: it is something else.
+        OSError: it cannot be read now.
+        DamagedFile: it is something else; its first entry that is not of the shape is named.
     """
     try:
-        content = json.loads(path.read_text())
+        content = json.loads(path.read_bytes(), parse_float=_finite, parse_int=_finite, parse_constant=_finite)
+        json.dumps(content, ensure_ascii=False).encode()  # half a character is none
     except RecursionError as error:
-        raise ValueError("it is nested too deeply") from error
+        raise DamagedFile("it is nested too deeply") from error
+    except ValueError as error:
+        raise DamagedFile(f"it is no json of text and numbers: {str(error)[:200]}") from error
     if not isinstance(content, dict) or not content:
-        raise ValueError(f"expected an object with something in it, found {content!r:.40}")
-    return content
+        raise DamagedFile(f"it is {content!r:.40}: expected an object with something in it")
+    _check_depth(content, DEEPEST)
+    return checked(content, shape)
+
+
+def _finite(word: str) -> int | float:
+    """A number of json, which may be as large as floats are; NaN and the infinities are none."""
+    value = float(word)
+    if not math.isfinite(value):
+        raise ValueError(f"{word:.40} is no finite number")
+    return int(word) if word.lstrip("-").isdecimal() else value
+
+
+def _check_depth(content: dict | list, left: int) -> None:
+    for one in content.values() if isinstance(content, dict) else content:
+        if isinstance(one, dict | list):
+            if not left:
+                raise DamagedFile("it is nested too deeply")
+            _check_depth(one, left - 1)
 
 
 def digests(folder: Path, names: Iterable[str]) -> dict[str, str]:
@@ -72,12 +98,23 @@ def digests(folder: Path, names: Iterable[str]) -> dict[str, str]:
 def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
     """The record of a finished stage; None where there is none, or it is no record of files in the folder."""
     try:
-        record = read_json(folder / RECORDS / f"{stage}.json")
-        recorded = record.get("sha256", {})
-        inside = all(not Path(name).is_absolute() and ".." not in Path(name).parts for name in (*record["files"], *recorded))
-    except (OSError, ValueError, TypeError, KeyError):
+        return checked_record(folder, stage)
+    except (OSError, DamagedFile):
         return None
-    return record if inside and isinstance(recorded, dict) else None
+
+
+def checked_record(folder: Path, stage: str) -> dict[str, Any]:
+    """The same.
+
+    Raises:
+        OSError: it cannot be read now, or there is none.
+        DamagedFile: it is no record of files in the folder.
+    """
+    record = read_json(folder / RECORDS / f"{stage}.json", RECORDS_OF.get(stage, Stage))
+    for name in (*record["files"], *record.get("sha256", {})):
+        if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+            raise DamagedFile(f"it is of {name!r:.80}: expected a file in the folder")
+    return record
 
 
 def write_record(folder: Path, stage: str, record: Mapping[str, Any]) -> None:
@@ -159,7 +196,7 @@ class RunFolder:
         """
         try:
             return read(self.path / name)
-        except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
+        except (OSError, ValueError) as error:
             raise RunConflict(
                 f"{self.path / name} cannot be read ({type(error).__name__}: {error}): it was changed after the run. Delete "
                 "it, and its stage is run again."

@@ -1,45 +1,15 @@
 """The files of a run's folder, which anybody may have written, read one at a time; what is wrong is said with its mend."""
 
-import contextlib
-import os
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from irl_gym.claims import AGAIN, into_folder, ours, shell_command
-from irl_gym.errors import IrlGymError, RunIncomplete
-from irl_gym.run_folder import NOT_THE_SAME, SURPRISES, changed
+from irl_gym.errors import DamagedFile, IrlGymError, RunIncomplete
+from irl_gym.run_folder import NOT_THE_SAME, RECORDS, changed, checked_record
 
 ONCE = ("config.json", "run.json")
 """Files that no stage writes: they are there from the start."""
-
-
-@contextlib.contextmanager
-def understood(*paths: str | os.PathLike) -> Iterator[None]:
-    """For what is made of folders that anybody may have written: json that no run leaves is the run's fault, no traceback.
-
-    Args:
-        paths: the folders.
-
-    Raises:
-        RunIncomplete: in place of what the surprise raised, which it names.
-    """
-    try:
-        yield
-    except IrlGymError:
-        raise
-    except SURPRISES as error:
-        raise not_understood(error, *paths) from error
-
-
-def not_understood(error: Exception, *paths: str | os.PathLike) -> RunIncomplete:
-    """The error of folders whose files can be read and say what no run says."""
-    told = ", ".join(map(str, paths))
-    return RunIncomplete(
-        f"{told} cannot be understood ({type(error).__name__}: {error}): expected files as a run leaves them. If they "
-        "were changed, or another program wrote them, make the run again; if not, it is a defect of irl_gym: please report it."
-    )
 
 
 class RunReader:
@@ -74,7 +44,7 @@ class RunReader:
             missing = Path(error.filename or name)
             told = missing.relative_to(self.path) if missing.is_relative_to(self.path) else name
             raise self.incomplete(f"{told} is missing") from error
-        except (OSError, *SURPRISES, EOFError, zipfile.BadZipFile, IrlGymError) as error:
+        except (OSError, ValueError, IrlGymError) as error:
             what = f"{name} cannot be read ({type(error).__name__}: {error})"
             if name in ONCE:
                 raise self.lost(what) from error
@@ -83,6 +53,16 @@ class RunReader:
     def maybe(self, name: str, read: Callable[[Path], Any]) -> Any:
         """The content of a file that not every run has."""
         return self.read(name, read) if (self.path / name).exists() else None
+
+    def record(self, stage: str) -> dict[str, Any] | None:
+        """The record of a stage; None where it has none."""
+        name = f"{RECORDS}/{stage}.json"
+        if not (self.path / name).exists():
+            return None
+        try:
+            return checked_record(self.path, stage)
+        except (OSError, DamagedFile) as error:
+            raise self.incomplete(f"the stage {stage!r} was not finished, as {name} cannot be read: {error}") from error
 
     def check(self, record: Mapping[str, Any]) -> None:
         """Check that files are those that were recorded."""

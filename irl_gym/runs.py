@@ -2,6 +2,7 @@
 Axes: S states, A actions, n points of the learning curve, k pieces of the lambda path.
 """
 
+import itertools
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,21 +13,25 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.archives import json_in, read_arrays
+from irl_gym.belonging import left_open, strangers
 from irl_gym.certificates import read_certificate
 from irl_gym.claims import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
 from irl_gym.curves import Curve, read_curve
+from irl_gym.diagnoses.spoken import with_names
 from irl_gym.errors import InvalidInput, RunIncomplete
 from irl_gym.evaluation import reward_told
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.listed_states import usual_observation
+from irl_gym.metrics_schema import Metrics
 from irl_gym.names import state_name
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import START, read_json, read_record
-from irl_gym.run_reader import RunReader, understood
+from irl_gym.run_folder import START, read_json
+from irl_gym.run_reader import RunReader
+from irl_gym.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
 from irl_gym.scores import RETRAINED, others
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
@@ -113,6 +118,10 @@ class Run:
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
+    def worded(self, sentence: str) -> str:
+        """A sentence with states and actions by their names, where there is a table."""
+        return sentence if self.table is None else with_names(sentence, self.state_name, self.actions)
+
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.
 
@@ -138,12 +147,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         RunConflict: no run of this library, or one with a link that leads out of its folder.
         RunNewer: a newer version wrote it.
     """
-    with understood(path):
-        return _read(Path(path), table)
-
-
-def _read(path: Path, table: Tabulation | None) -> Run:
-    """The run; json that says what no run says raises whatever it raises."""
+    path = Path(path)
     if not (path / "config.json").is_file():
         raise RunIncomplete(f"{path} holds no run: expected a folder with a config.json. Name the --out of a run.")
     check_links(path)
@@ -151,9 +155,11 @@ def _read(path: Path, table: Tabulation | None) -> Run:
     older = not (path / "run.json").exists()
     version: dict[str, Any] = {} if older else reader.read("run.json", read_json)
     check_format(path, version)
+    if not older:
+        reader.read("run.json", lambda _: checked(version, Version))
     reader.command = version.get("command")
-    config = reader.read("config.json", read_json)
-    records = {name: record for name in (START, *STAGES) if (record := read_record(path, name)) is not None}
+    config = reader.read("config.json", lambda one: read_json(one, Config))
+    records = {name: record for name in (START, *STAGES) if (record := reader.record(name)) is not None}
     stages = {name: record for name, record in records.items() if name != START}
     for name in FIRST if older else STAGES[:-1]:
         if name not in stages:
@@ -164,7 +170,7 @@ def _read(path: Path, table: Tabulation | None) -> Run:
     if config.get("env_id") not in (None, env_id):
         what = f"{ENVIRONMENT} is of {env_id!r}: expected {config['env_id']!r}, as config.json has"
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
-    metrics = reader.read("metrics.json", read_json)
+    metrics = reader.read("metrics.json", lambda one: read_json(one, Metrics))
     on_table = metrics.get("table") is not None
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
@@ -174,15 +180,15 @@ def _read(path: Path, table: Tabulation | None) -> Run:
         agent=reader.read("agent_policy.npz", load_actions) if on_table else None,
         certificate=reader.read("certificate.json", read_certificate), metrics=metrics,
         curve=reader.read("learning_curve.csv", read_curve), stages=stages,
-        grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one))),
+        grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one, Grid))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
                if (path / "films" / f"{name}.json").exists()},
-        diagnosis=reader.maybe("diagnosis.json", read_json),
+        diagnosis=reader.maybe("diagnosis.json", lambda one: read_json(one, Diagnosed)),
         widths=reader.maybe("ambiguity.npz", lambda one: _part(one, "widths")),
         lambda_path=reader.maybe("ambiguity.npz", lambda one: _part(one, "path")),
         vouched=reader.files <= {name for one in records.values() for name in one.get("sha256", ())},
     )  # fmt: skip
-    _check_shapes(run, reader)
+    _check_together(run, reader)
     return _with_proof(run, reader)
 
 
@@ -197,8 +203,8 @@ def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str
 
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    content = read_json(path)
-    return content["id"], told_space("observations", content["observations"]), tuple(map(str, content["actions"]))
+    content = read_json(path, Environment)
+    return content["id"], told_space("observations", content["observations"]), tuple(content["actions"])
 
 
 def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:
@@ -211,30 +217,20 @@ def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Sp
     return reader.read(TABLE, lambda path: load_table(path, observations))
 
 
-def _check_shapes(run: Run, reader: RunReader) -> None:
-    """Check that rewards and policies are of the run's own table: a file may have been copied from another run.
+def _check_together(run: Run, reader: RunReader) -> None:
+    """Check that what lies beside a table is of that table.
 
     Raises:
-        RunIncomplete: one is not, by the name of its file.
+        RunIncomplete: something is not, by the name of its file.
     """
     if run.table is None:
         return
-    learned = run.learned.values if isinstance(run.learned, TabularReward) else None  # weights are of features
-    shape = (run.table.mdp.n_states, run.table.mdp.n_actions)
-    for name, found in (("reward.npz", learned), ("expert.npz", run.expert), ("agent_policy.npz", run.agent)):
-        if found is not None and found.shape not in (shape, shape[:1]):
-            raise reader.incomplete(
-                f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; delete it, and its stage is "
-                "run again"
-            )
-    for name, policy in (("expert.npz", run.expert), ("agent_policy.npz", run.agent)):
-        if policy is not None and policy.ndim == 1 and policy.max(initial=0) >= shape[1]:
-            what = f"{name} has action {policy.max()} of {shape[1]}"
-            raise reader.incomplete(f"{what}; delete it, and its stage is run again")
-    for name, width in (run.widths or {}).items():
-        if np.shape(width) not in (shape, shape[:1]):
-            what = f"ambiguity.npz has widths.{name} of shape {np.shape(width)} for {shape[0]} states"
-            raise reader.incomplete(f"{what}; delete it, and its stage is run again")
+    rewards = {"reward.npz": run.learned.values} if isinstance(run.learned, TabularReward) else {}  # weights are of features
+    policies = {name: one for name, one in (("expert.npz", run.expert), ("agent_policy.npz", run.agent)) if one is not None}
+    shape = run.table.mdp.n_states, run.table.mdp.n_actions
+    found = strangers(shape, run.actions, rewards, policies, run.grid, run.diagnosis)
+    for fault in itertools.chain(found, left_open(shape, run.widths, run.lambda_path)):
+        raise reader.incomplete(fault)
 
 
 def _with_proof(run: Run, reader: RunReader) -> Run:

@@ -8,7 +8,6 @@ looks at the clock between its iterations; where one could be long, since factor
 drawn at random), it works in a process that is killed when the time is up (`killable`).
 """
 
-import enum
 import time
 import warnings
 from collections.abc import Callable
@@ -23,34 +22,13 @@ from irl_gym.checks import is_word
 from irl_gym.deadline import NEVER, Deadline
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 from irl_gym.killable import called, within
+from irl_gym.status import Status as Status
 
 SolverName = Literal["auto", "clarabel", "highs"]
 SMALL = 1_500
 """Rows up to which HiGHS is chosen."""
 SECOND_SECONDS, SECOND_SHARE = 60.0, 10.0
 """A second attempt without a time limit ends after so many seconds, or so many times what the first took, whichever is more."""
-
-
-class Status(enum.Enum):
-    """What became of a linear program, in a sentence with the mend."""
-
-    OPTIMAL = "Optimal within the solver's tolerances."
-    INACCURATE = (
-        "Solved, but short of the solver's tolerances. Read the certificate's duality gap; if it is too large, choose the "
-        "other solver."
-    )
-    ZERO = (
-        "R = 0 is optimal: the l1 penalty is above lambda_0, where no reward is worth its price. Lower l1 below lambda_0, or "
-        "make it auto."
-    )
-    ZERO_WEIGHTS = (
-        "R = 0 is optimal, alpha = 0: no reward in the span of the features is worth more. Lower l1, or give features that "
-        "tell the expert's successors from other actions'."
-    )
-    INEXPRESSIBLE = (
-        "No reward in the span of the features makes the expert optimal, but those that tie it with everything; this one "
-        "violates least. Give more or other features."
-    )
 
 
 @dataclass(frozen=True)

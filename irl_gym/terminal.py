@@ -1,6 +1,7 @@
 """What all scripts say in a terminal in the same way: how far a stage is, and what went wrong."""
 
 import contextlib
+import traceback
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -62,3 +63,27 @@ def print_error(error: Exception) -> None:
     """A mistake of the user's, or what the system refused, in one line on standard error: the error's name, and its words."""
     text = Text.assemble((type(error).__name__, "bold red"), f": {harmless(str(error))}")
     Console(stderr=True, soft_wrap=True).print(text)
+
+
+DEFECT = 70
+"""What a script exits with that stumbled over a defect of irl_gym: EX_SOFTWARE, as sysexits.h has it."""
+
+
+def exit_code(script: Callable[[], int], others: str = "") -> int:
+    """What a script exits with.
+
+    Whatever is wrong with a user's arguments and files has an error of its own, which scripts print. Any other is a defect of
+    irl_gym, and is called one, with what is needed to report it.
+
+    Args:
+        script: tells what it exits with.
+        others: whose code runs in it besides, such as "the environment", and may be what is wrong.
+    """
+    try:
+        return script()
+    except Exception as error:
+        whose = f"irl_gym or of {others}" if others else "irl_gym"
+        told = f"This is a defect of {whose}, not of your files: {type(error).__name__}: {error}"
+        said = f"{told}. Please report it with this traceback:\n{''.join(traceback.format_exception(error))}"
+        Console(stderr=True, soft_wrap=True).print(Text(harmless(said)))
+        return DEFECT

@@ -29,6 +29,7 @@ from irl_gym.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.rewards import TabularReward
 from irl_gym.rollouts import maker_of, run_episodes
 from irl_gym.run_folder import RunFolder, read_json, write_json
+from irl_gym.run_schema import Trained
 from irl_gym.simulator import RandomPolicy
 from irl_gym.table_world import Choose, Glance, Progress, TableWorld, step_limit
 
@@ -120,7 +121,7 @@ class SteppedWorld:
 
     def load(self, folder: RunFolder, name: str) -> Policy:
         """The agent: a file of this run's own, so SB3 may load it."""
-        made: Any = folder.load(f"{name}.json", read_json)
+        made: Any = folder.load(f"{name}.json", lambda path: read_json(path, Trained))
         agent = folder.load(f"{name}.zip", lambda path: load_agent(path, made["algorithm"]))
         space: Any = self.env.action_space
         return Noisy(agent, made["epsilon"], int(space.n), self.seed) if made["epsilon"] else agent

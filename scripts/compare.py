@@ -18,9 +18,8 @@ from irl_gym.facts import harmless
 from irl_gym.page.comparison import lettered, write_comparison
 from irl_gym.page.pooled import told
 from irl_gym.pooling import pools
-from irl_gym.run_reader import understood
-from irl_gym.runs import Run, read_run
-from irl_gym.terminal import check_writable, print_error
+from irl_gym.runs import read_run
+from irl_gym.terminal import check_writable, exit_code, print_error
 
 
 @dataclass(frozen=True)
@@ -39,15 +38,13 @@ def main(arguments: Arguments) -> int:
         if len(arguments.runs) == 1:
             raise InvalidParameter(f"runs has 1 folder, {arguments.runs[0]}: expected two or more to put side by side.")
         check_writable(arguments.out)
-        runs = [_read(folder) for folder in arguments.runs]
-        with understood(*arguments.runs):
-            write_comparison(runs, arguments.out)
-            together = [told(pool) for pool in pools(lettered(runs))] + [
-                f"{run.path}: {run.caution}" for run in runs if run.caution is not None
-            ]
+        runs = [read_run(folder) for folder in arguments.runs]
+        write_comparison(runs, arguments.out)
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
+    together = [told(pool) for pool in pools(lettered(runs))]
+    together += [f"{run.path}: {run.caution}" for run in runs if run.caution is not None]
     console = Console(soft_wrap=True)
     for line in together:
         console.print(Text(harmless(line)))
@@ -55,11 +52,6 @@ def main(arguments: Arguments) -> int:
     return 0
 
 
-def _read(folder: Path) -> Run:
-    """One run; what is wrong with it names it alone."""
-    with understood(folder):
-        return read_run(folder)
-
-
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    asked = tyro.cli(Arguments, description=__doc__)
+    sys.exit(exit_code(lambda: main(asked)))

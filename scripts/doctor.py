@@ -1,7 +1,11 @@
 """Say in sentences what is wrong with the reward of a run, each with a mend.
 
-Exits with 0 where the reward is healthy, 1 where something was found or the run did not finish, be it that its page alone is
-missing, 2 where there is no run, or its files cannot be examined.
+Exits with
+    0   the reward is healthy
+    1   something was found, or the run did not finish, be it that its page alone is missing
+    2   there is no run, or its files cannot be read
+    3   too little could be examined to call the reward healthy
+    70  the doctor stumbled over a defect of irl_gym
 
 For example:
     python scripts/doctor.py --run runs/FrozenLake-v1-1a2b3c4d
@@ -17,14 +21,16 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.diagnoses.findings import told_answer
 from irl_gym.diagnoses.spoken import usable_flags, with_names
 from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
 from irl_gym.errors import RunIncomplete
 from irl_gym.facts import harmless
-from irl_gym.run_reader import understood
 from irl_gym.runs import Run, read_run
-from irl_gym.terminal import print_error
+from irl_gym.terminal import exit_code, print_error
 
+CODES = {"healthy": 0, "findings": 1, "not examined": 3}
+"""What the script exits with, by the doctor's answer."""
 WHOSE = (
     "What only the learner knew, as lambda_0 and what its solver said, and what episodes showed is the run's own record; "
     "all else is computed now."
@@ -41,11 +47,9 @@ class Arguments:
 
 def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
     """Print a diagnosis: with the names of states where the run is at hand, and mends as Python and as flags."""
-    if diagnosis.healthy:
-        console.print(Text.assemble(("Healthy. ", "bold green"), harmless(diagnosis.examined)))
-        return
-    count = len(diagnosis.findings)
-    console.print(Text.assemble((f"{count} finding{'s' if count > 1 else ''}. ", "bold yellow"), harmless(diagnosis.examined)))
+    style = "bold green" if diagnosis.healthy else "bold yellow"
+    answer = harmless(told_answer(diagnosis.to_json()))
+    console.print(Text.assemble((answer, style), f" {harmless(diagnosis.examined)}"))
     for number, one in enumerate(diagnosis.findings, start=1):
         known = run is not None and run.table is not None
         sentence = with_names(one.sentence, run.state_name, run.actions) if run is not None and known else one.sentence
@@ -59,8 +63,7 @@ def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
 def left(path: Path) -> Diagnosis | None:
     """What can be said of a run that did not finish; None where that is nothing, or its files are no run's."""
     try:
-        with understood(path):
-            return diagnose_unfinished(path)
+        return diagnose_unfinished(path)
     except (IrlGymError, OSError):
         return None
 
@@ -78,9 +81,8 @@ def main(arguments: Arguments) -> int:
     """Read the run, and say what there is."""
     console, unfinished, run = Console(soft_wrap=True), None, None
     try:
-        with understood(arguments.run):
-            run = read_run(arguments.run)
-            diagnosis = diagnose_run(run)
+        run = read_run(arguments.run)
+        diagnosis = diagnose_run(run)
     except (IrlGymError, OSError) as error:
         unfinished = error
         diagnosis = left(arguments.run) if isinstance(error, RunIncomplete) else None
@@ -93,8 +95,9 @@ def main(arguments: Arguments) -> int:
     if run is not None and run.caution is not None:
         console.print(Text(f"\n{run.caution}"))
     complete = unfinished is None and not without_page(run, console)
-    return 0 if diagnosis.healthy and complete else 1
+    return CODES[diagnosis.answer] if complete else CODES["findings"]
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    asked = tyro.cli(Arguments, description=__doc__)
+    sys.exit(exit_code(lambda: main(asked)))

@@ -24,7 +24,7 @@ from irl_gym.demonstrators import Recording
 from irl_gym.experiment import parse_keywords
 from irl_gym.export import Amount, export_dataset
 from irl_gym.minari_files import unkept
-from irl_gym.terminal import OPTIONS, UNSET, print_error, stage_bars
+from irl_gym.terminal import OPTIONS, UNSET, exit_code, print_error, stage_bars
 
 
 @dataclass(frozen=True)
@@ -109,4 +109,5 @@ def main(arguments: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))
+    asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
+    sys.exit(exit_code(lambda: main(asked), others="the environment"))

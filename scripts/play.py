@@ -25,7 +25,7 @@ from irl_gym.keyboard import controls_of
 from irl_gym.minari_files import unkept
 from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
 from irl_gym.screens import as_text, draw, terminal_keys, window_keys
-from irl_gym.terminal import OPTIONS, UNSET, print_error
+from irl_gym.terminal import OPTIONS, UNSET, exit_code, print_error
 
 ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 """Ctrl-C, a kill, a terminal that is closed: nothing that was finished is lost."""
@@ -117,4 +117,5 @@ def main(asked: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))
+    asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
+    sys.exit(exit_code(lambda: main(asked), others="the environment"))

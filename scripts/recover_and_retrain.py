@@ -17,7 +17,7 @@ from irl_gym import IrlGymError, recover_and_retrain
 from irl_gym.arguments import Arguments
 from irl_gym.claims import PROGRAM
 from irl_gym.report import print_report
-from irl_gym.terminal import OPTIONS, print_error, stage_bars
+from irl_gym.terminal import OPTIONS, exit_code, print_error, stage_bars
 
 
 def main(arguments: Arguments, command: Sequence[str]) -> int:
@@ -39,4 +39,4 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
 
 if __name__ == "__main__":
     asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
-    sys.exit(main(asked, [*PROGRAM, *sys.argv[1:]]))
+    sys.exit(exit_code(lambda: main(asked, [*PROGRAM, *sys.argv[1:]]), others="the environment"))

@@ -15,9 +15,8 @@ from rich.text import Text
 
 from irl_gym import IrlGymError
 from irl_gym.page.report import write_report
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
-from irl_gym.terminal import OPTIONS, UNSET, check_writable, print_error
+from irl_gym.terminal import OPTIONS, UNSET, check_writable, exit_code, print_error
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,8 @@ def main(arguments: Arguments) -> int:
     try:
         if arguments.out is not None:
             check_writable(out)
-        with understood(arguments.run):
-            run = read_run(arguments.run)
-            write_report(run, out)
+        run = read_run(arguments.run)
+        write_report(run, out)
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
@@ -47,4 +45,5 @@ def main(arguments: Arguments) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(Arguments, description=__doc__, config=OPTIONS)))
+    asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
+    sys.exit(exit_code(lambda: main(asked)))

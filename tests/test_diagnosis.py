@@ -8,8 +8,9 @@ import pytest
 from conftest import KWARGS
 from hypothesis import given
 from models import models, paper_grid
-from patients import judged, names
+from patients import judged, names, sampled
 
+from irl_gym.diagnoses import case, evidence
 from irl_gym.diagnosis import CHECKS, Diagnosis, Finding, doctor
 from irl_gym.dynamic_programming import policy_iteration
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidReward
@@ -49,13 +50,47 @@ def test_the_default_learner_is_healthy_on_random_tables(model):
 
 def test_a_diagnosis_reads_as_sentences_with_their_mends():
     text = str(doctor(FiniteLP(l1=5.0).fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert))
-    assert text.startswith("1 finding. Examined: 24 states of 4 actions each, gamma 0.9.\n1. The reward is zero")
+    assert text.startswith("1 finding. Examined: 24 states of 4 actions each, gamma 0.9. Not examined, of ")
+    assert "not known.\n1. The reward is zero" in text
     assert '\n   Mend: margin_cap="auto" with l1=0.0' in text
 
 
 def test_a_healthy_diagnosis_says_what_was_examined():
     text = str(doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert))
     assert text.startswith("Healthy. Examined: 24 states") and "in 24 of 24" in text
+
+
+def test_questions_that_cannot_be_asked_are_counted_with_why():
+    said = doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert).examined
+    assert said.endswith(
+        f" Not examined, of {len(CHECKS)} questions: 5, as no run judged it; 2, as the true reward is not known."
+    )
+
+
+def test_questions_that_take_programs_are_not_asked_of_a_large_table(monkeypatch):
+    monkeypatch.setattr(case, "SMALL", 3)
+    monkeypatch.setattr(evidence, "SMALL", 3)
+    made = doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert, true=GRID.R)
+    assert made.healthy and "3, as programs are solved again for at most 3 reachable states" in made.examined
+
+
+def test_a_reward_without_a_table_is_as_healthy_as_its_certificate():
+    made = doctor(sampled(), None, None)
+    table = sum(bool(set(needs) & {"expert", "reward", "true", "programs"}) for needs in CHECKS.values())
+    assert made.healthy and made.examined.startswith("Examined: what the learner certified.")
+    assert f"{table}, as there is no table" in made.examined
+
+
+@pytest.mark.parametrize("R", [-GRID.R, np.zeros(25)])
+def test_a_reward_whose_certificate_shows_nothing_is_not_called_healthy_without_a_table(R):
+    made = doctor(judged(GRID.mdp, GRID.expert, R), None, None)
+    assert made.answer == "not examined" and "no certificate by which the expert is best" in str(made)
+
+
+def test_a_reward_whose_expert_is_not_known_is_not_called_healthy():
+    made = doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, None)
+    assert made.answer == "not examined" and not made.healthy
+    assert str(made).startswith("Not examined: the expert is known in no state in which it acts. Examined: ")
 
 
 def test_a_diagnosis_is_json():

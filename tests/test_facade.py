@@ -5,7 +5,7 @@ import sys
 
 import irl_gym
 
-HEAVY = ("torch", "cvxpy", "minari", "matplotlib", "ray", "stable_baselines3", "gymnasium", "scipy")
+HEAVY = ("pydantic", "torch", "cvxpy", "minari", "matplotlib", "ray", "stable_baselines3", "gymnasium", "scipy")
 
 
 def test_every_name_of_the_facade_is_there():

@@ -118,7 +118,7 @@ def test_the_same_seed_makes_the_same_film(taxi, tmp_path):
 def test_a_kind_of_pictures_that_leads_out_of_the_folder_is_refused(line, tmp_path):
     told = read_json(line.out / "films" / "agent.json")
     write_json(tmp_path / "agent.json", {**told, "kind": "/../../../secret"})
-    with pytest.raises(ValueError, match="expected one of webp, png"):
+    with pytest.raises(ValueError, match="expected 'webp' or 'png'"):
         load_film(tmp_path / "agent.json")
 
 

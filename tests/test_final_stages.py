@@ -17,7 +17,6 @@ from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import SB3
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
 
 ASKED = {"env_kwargs": {"is_slippery": False}, "episodes": 5, "eval_episodes": 5, "num_envs": 8}
@@ -98,9 +97,3 @@ def test_drawing_sets_no_variable_that_the_user_has_set_and_leaves_none_behind(m
     with filming._quietly():
         seen = [os.environ["SDL_VIDEODRIVER"], os.environ["SDL_AUDIODRIVER"]]
     assert seen == ["offscreen", "dummy"] and "SDL_AUDIODRIVER" not in os.environ
-
-
-@pytest.mark.parametrize("surprise", [KeyError("policies"), TypeError("not a number"), IndexError("too far")])
-def test_a_folder_that_cannot_be_understood_is_named(surprise):
-    with pytest.raises(RunIncomplete, match=r"runs/theirs cannot be understood \(\w+Error"), understood("runs/theirs"):
-        raise surprise

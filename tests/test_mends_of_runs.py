@@ -126,6 +126,12 @@ def again(run):
     return read_run(run)
 
 
+def judged_again(run):
+    (run / "metrics.json").unlink()
+    recover_and_retrain(asked(), run)
+    return read_run(run)
+
+
 def busy(run):
     """Two processes ask for one folder."""
     with held(run, "the first"):
@@ -136,14 +142,7 @@ READ = [
     ("wait for it,", "run.json", {}, busy, lambda run: recover_and_retrain(asked(), run)),
     ("or choose another --out.", "run.json", {}, busy, lambda run: claim(run.parent / "another", {}) is None),
     ("Name the --out of a run.", "config.json", None, read_run, lambda run: read_run(run.parent / "whole")),
-    (
-        "If they were changed, or another program wrote them, make the run again; "
-        "if not, it is a defect of irl_gym: please report it.",
-        "metrics.json",
-        {"policies": None},
-        read_run,
-        lambda run: read_run(run.parent / "whole"),
-    ),
+    ("delete it, and its stage is run again", "metrics.json", {"policies": None}, read_run, judged_again),
     ("which no stage writes again. Make the run again, with another --out: ", "config.json", "{", read_run, as_told),
     ("Upgrade irl_gym.", "run.json", {"format": "irl_gym.Run/2"}, read_run, of_version_2),
     ("If irl_gym made the run, delete that file.", "run.json", {"format": "irl_gym.Run/x"}, read_run, again),

@@ -13,7 +13,18 @@ from irl_gym.pipeline import Report
 from irl_gym.report import print_report
 from irl_gym.scorecard import settled_at
 
+FOUND = {
+    "name": "blind-expert", "sentence": "The expert returns 110 here.", "mend": "Give the statistics.", "states": [],
+    "actions": [], "flags": [],
+}  # fmt: skip
 CURVE = np.array([[0.0, 0.0], [64, 0.92], [128, 0.5], [192, 0.95], [256, 0.991], [320, 1.0]])
+
+
+def doctored(out, *findings, **changes):
+    """What the doctor says."""
+    answer = "findings" if findings else "healthy"
+    told = {"answer": answer, "why": None, "examined": "Examined: it.", "findings": findings} | changes
+    (out / "diagnosis.json").write_text(json.dumps(told))
 
 
 def said(
@@ -34,6 +45,9 @@ def said(
     }  # fmt: skip
     asked = {"env_id": "Lake-v0", "env_kwargs": {}, "gamma": 0.9, "seed": 0, "start_seeds": [], "dataset": None}
     stages = {"agent": {"seconds": 1.0, "environment_steps": 4096}}
+    out.mkdir(parents=True, exist_ok=True)
+    if not (out / "diagnosis.json").exists():
+        doctored(out)
     console = Console(file=io.StringIO(), width=250, force_terminal=coloured, color_system="standard" if coloured else None)
     print_report(
         Report(out, metrics, dict(zip(("optimality", "proof"), kept, strict=True)), stages, asked | (config or {}), {}), console
@@ -80,14 +94,20 @@ def test_a_fact_has_the_colour_of_its_mood(tmp_path):
     assert "\x1b[31min 1 state" in said(tmp_path, facts=((Fact("violated", "in 1 state", "bad"),), ()), coloured=True)
 
 
-def test_a_healthy_run_does_not_mention_the_doctor(tmp_path):
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": []}))
-    assert "doctor" not in said(tmp_path)
+def test_a_healthy_run_is_called_so(tmp_path):
+    text = said(tmp_path)
+    assert "The doctor: Healthy. Open" in text
 
 
 def test_an_unhealthy_run_names_the_doctor(tmp_path):
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [{}]}))
-    assert f"The doctor found 1 thing: python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
+    doctored(tmp_path, FOUND)
+    assert f"The doctor: 1 finding. python scripts/doctor.py --run {tmp_path}" in said(tmp_path)
+
+
+def test_a_run_that_could_not_be_examined_is_not_called_healthy(tmp_path):
+    doctored(tmp_path, answer="not examined", why="it is gone")
+    text = said(tmp_path)
+    assert "The doctor: Not examined: it is gone. Open" in text and "ealthy" not in text
 
 
 def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
@@ -98,13 +118,12 @@ def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
 
 
 def test_what_is_wrong_with_the_given_expert_is_told_at_once(tmp_path):
-    found = {"name": "blind-expert", "sentence": "The expert returns 110 here.", "mend": "Give the statistics."}
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"findings": [found]}))
+    doctored(tmp_path, FOUND)
     assert "Warning: The expert returns 110 here. Give the statistics." in said(tmp_path)
 
 
 def test_a_dataset_is_told_with_its_environment(tmp_path):
-    (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0"}))
+    (tmp_path / ENVIRONMENT).write_text(json.dumps({"id": "Lake-v0", "observations": "{}", "actions": []}))
     assert said(tmp_path, config={"env_id": None, "dataset": "me/two-v0"}).startswith("Lake-v0, the environment of me/two-v0;")
 
 
@@ -161,4 +180,4 @@ def test_names_are_printed_as_they_are_and_never_read_as_markup(tmp_path, name):
         facts=((), (Fact("status", f"it is {name}"),)), config={"env_kwargs": {"map": name}, "dataset": name},
     )  # fmt: skip
     assert f"/{name}: dataset, reward" in text and f"/{name}/report.html in a browser" in text
-    assert f"(map={name})" in text and f"There is no score: of {name}." in text and f"status │ it is {name}" in text
+    assert f"(map={name})" in text and f"There is no score: of {name}." in text

@@ -43,9 +43,9 @@ def test_several_stages_log_into_one_folder(folder):
 
 
 def test_a_stage_whose_logs_were_deleted_is_not_run_again(folder):
-    folder.run("agent", logging("agent"))
+    folder.run("one", logging("agent"))
     shutil.rmtree(folder.path / LOGS)
-    assert folder.done("agent")
+    assert folder.done("one")
 
 
 def test_a_stages_files_are_in_place_after_it(folder):

@@ -1,3 +1,4 @@
+import re
 import time
 from functools import partial
 
@@ -196,8 +197,13 @@ def test_solve_refuses_an_unknown_solver(unchecked):
 
 
 @pytest.mark.parametrize("status", Status)
-def test_status_is_a_sentence(status):
-    assert status.value[0].isupper() and " " in status.value
+def test_status_is_a_name_with_a_sentence(status):
+    assert Status(status.value) is status and re.fullmatch("[a-z-]+", status.value)
+    assert status.sentence[0].isupper() and status.sentence.endswith(".")
+
+
+def test_status_says_that_a_reward_of_zero_is_of_no_use():
+    assert {one for one in Status if not one.usable} == {Status.ZERO, Status.ZERO_WEIGHTS}
 
 
 def test_a_program_without_an_answer_before_is_late_where_its_time_is_up_now():

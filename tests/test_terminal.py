@@ -7,7 +7,7 @@ from rich.console import Console
 
 from irl_gym.errors import RunIncomplete
 from irl_gym.facts import harmless
-from irl_gym.terminal import print_error, stage_bars
+from irl_gym.terminal import DEFECT, exit_code, print_error, stage_bars
 
 
 def shown(*, terminal):
@@ -49,6 +49,20 @@ def test_an_error_shows_what_a_terminal_would_obey_and_does_not_send_it(capsys):
     print_error(RunIncomplete("gamma \x1b]0;title\x07\x1b[31m \x9b31m \u202e \ud800\nexpected é"))
     said = capsys.readouterr().err
     assert not set("\x1b\x07\x9b\u202e\ud800") & set(said) and "\\x1b]0;title\\x07" in said and "\nexpected é" in said
+
+
+def test_whose_defect_may_be_is_said(capsys):
+    def broken():
+        raise ZeroDivisionError("\x1b[31mof what")
+
+    assert exit_code(broken, others="the environment") == DEFECT == 70
+    said = capsys.readouterr().err
+    told = "This is a defect of irl_gym or of the environment, not of your files: ZeroDivisionError: \\x1b[31mof what. Please"
+    assert said.startswith(told) and "Traceback (most recent call last)" in said and "in broken" in said
+
+
+def test_a_script_without_a_defect_exits_as_it_says():
+    assert exit_code(lambda: 2) == 2
 
 
 def test_a_plain_text_is_shown_as_it_is():

@@ -119,7 +119,7 @@ def edited(path, **changes):
 EDITS = {
     "metrics.json": {
         "reward.learner": ("Theirs", "config.json"), "demonstrations.given": (True, "config.json"),
-        "reward.status": ("Perfect", r"\.stages/reward\.json"),
+        "reward.status": ("inaccurate", r"\.stages/reward\.json"),
         "demonstrations.episodes": (7, r"\.stages/demonstrations\.json"),
         "reward.degenerate": (True, r"certificate\.json"), "reward.violated_states": (3, r"certificate\.json"),
         "table.exact": (False, r"table\.npz"), "table.states": (17, r"table\.npz"), "table.horizon": (3, r"table\.npz"),
@@ -142,7 +142,7 @@ def test_an_entry_that_other_files_contradict_is_named_with_them(copied, name, e
 @pytest.mark.parametrize(
     ("name", "entry", "value", "gone"),
     [
-        ("metrics.json", "reward.status", "Perfect", ["metrics.json"]),
+        ("metrics.json", "reward.status", "inaccurate", ["metrics.json"]),
         ("certificate.json", "proof.objective", 7.0, ["certificate.json", "metrics.json"]),
         ("environment.json", "id", "Theirs-v0", ["environment.json"]),
     ],

@@ -1,5 +1,6 @@
 """A file of a run that is not the one it left is named when the run is read or continued, with a mend that works."""
 
+import io
 import json
 
 import numpy as np
@@ -7,8 +8,9 @@ import pytest
 from forgetting import without_digests
 from rich.console import Console
 
+from irl_gym import final_stages
 from irl_gym.diagnosis import diagnose_unfinished
-from irl_gym.errors import RunConflict, RunIncomplete
+from irl_gym.errors import RunConflict, RunIncomplete, SolverFailed
 from irl_gym.experiment import Experiment
 from irl_gym.pipeline import recover_and_retrain
 from irl_gym.planners import ValueIteration
@@ -184,18 +186,25 @@ def test_a_record_that_does_not_tell_its_demonstrations_leaves_the_loss_to_the_r
     assert recomputed(copied, asked, run.metrics["reward"], run.table, run.expert, run.tabular) is None
 
 
-def test_a_continued_run_whose_record_says_what_none_says_is_refused_in_our_words(copied):
-    without_digests(copied)
-    write_json(copied / ".stages" / "expert.json", {"files": []})
-    report = recover_and_retrain(ASKED, copied)
-    with pytest.raises(RunIncomplete, match=r"cannot be understood .KeyError: 'seconds'.: expected files as a run leaves"):
-        print_report(report, Console())
+@pytest.mark.parametrize(("stage", "told"), [("expert", {"files": []}), ("reward", {"stats": 5}), ("agent", {"seconds": -1})])
+def test_a_stage_whose_record_says_what_none_says_is_run_again(copied, stage, told):
+    kept = copied / ".stages" / f"{stage}.json"
+    was = read_json(kept)
+    write_json(kept, told if stage == "expert" else was | told)
+    stages = recover_and_retrain(ASKED, copied).stages
+    assert [name for name, record in stages.items() if not record.get("kept")] == ["table", stage]
+    assert read_json(kept)["sha256"] == was["sha256"]
 
 
-def test_a_doctor_who_cannot_read_a_record_says_so_in_his(copied):
-    record = read_json(copied / ".stages" / "reward.json")
-    write_json(copied / ".stages" / "reward.json", record | {"stats": 5})
-    (copied / ".stages" / "ambiguity.json").unlink()
-    with pytest.raises(RunIncomplete, match=r"cannot be understood .TypeError"):
-        recover_and_retrain(ASKED, copied)
-    assert "cannot be understood (" in read_json(copied / ".stages" / "ambiguity.json")["no_diagnosis"]
+def test_an_examination_that_fails_is_told_as_no_answer(copied, monkeypatch):
+    def refused(case):
+        raise SolverFailed("no solver gave an answer.")
+
+    monkeypatch.setattr(final_stages, "diagnose", refused)
+    for stage in ("ambiguity", "report"):
+        (copied / ".stages" / f"{stage}.json").unlink()
+    console = Console(file=io.StringIO(), width=250)
+    print_report(recover_and_retrain(ASKED, copied), console)
+    assert read_run(copied).diagnosis["answer"] == "not examined"
+    told = "Not examined: the examination failed (SolverFailed: no solver gave an answer.)."
+    assert told in console.file.getvalue() and told in (copied / "report.html").read_text()

@@ -1,7 +1,6 @@
-"""The evidence that the doctor works on: a table, an expert, a reward, and what the learner's proof says.
+"""The evidence that the doctor works on, of a result in memory and of a run's folder alike.
 
-It can be made of a result in memory and of a run's folder alike. What follows from P, the expert and R is computed here again;
-of the proof is taken only what it alone knows: the terms of the program, its bound, and sampled values.
+What follows from P, the expert and R is computed again; of the learner's proof only what it alone knows is taken.
 Axes: S states, A actions, n rows of (4) among the reachable states in which the expert is known.
 """
 
@@ -26,6 +25,7 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.metrics import Tie, ties_of, worst_tie
 from irl_gym.policies import as_distribution, completed
 from irl_gym.rewards import TabularReward
+from irl_gym.status import Status
 
 SMALL = 2_000
 """Reachable states up to which programs are solved again, to say what another learner would find."""
@@ -82,8 +82,8 @@ class Case:
     """R in the table; None where no reward came out, or there is no table."""
     claims: Mapping[str, Any] = field(default_factory=dict)
     """What a certificate says, by name (`certificates.claims_in`), or a proof's `to_json()`; empty where there is neither."""
-    status: str = ""
-    """What became of the program, in a sentence."""
+    status: Status | None = None
+    """What became of the program; None where there was none, or nothing is known of it."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, attempts, rounds."""
     true: TabularReward | None = None
@@ -94,6 +94,8 @@ class Case:
     """The content of a run's metrics.json; empty where nothing was judged."""
     weights: np.ndarray | None = None
     """(K,) alpha of a reward that is linear in features; None for another."""
+    gone: str | None = None
+    """Why the expert is not known, where it was once."""
 
     @cached_property
     def on_states(self) -> bool:

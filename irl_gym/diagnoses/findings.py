@@ -1,7 +1,8 @@
 """What the doctor says: findings, each a sentence and a mend, and the diagnosis that they make."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,6 +43,9 @@ class Finding:
         }
 
 
+Answer = Literal["healthy", "findings", "not examined"]
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """All that the doctor found."""
@@ -49,12 +53,19 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     """In order of importance."""
     examined: str
-    """What was looked at, in a sentence."""
+    """What was looked at, and what was not and why, in sentences."""
+    why: str | None = None
+    """Why too little could be looked at to call the reward healthy; None where enough was."""
+
+    @property
+    def answer(self) -> Answer:
+        """What is wrong was found, or nothing is wrong, or that cannot be said."""
+        return "findings" if self.findings else "healthy" if self.why is None else "not examined"
 
     @property
     def healthy(self) -> bool:
-        """Was nothing found?"""
-        return not self.findings
+        """Was enough looked at, and nothing found?"""
+        return self.answer == "healthy"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,19 +74,24 @@ class Diagnosis:
 
     def __str__(self) -> str:
         """The diagnosis as a person reads it."""
-        if self.healthy:
-            return f"Healthy. {self.examined}"
         told = [f"{number}. {one.sentence}\n   Mend: {one.mend}" for number, one in enumerate(self.findings, start=1)]
-        count = "1 finding" if len(told) == 1 else f"{len(told)} findings"
-        return "\n".join([f"{count}. {self.examined}", *told])
+        return "\n".join([f"{told_answer(self.to_json())} {self.examined}".strip(), *told])
 
     def to_json(self) -> dict[str, Any]:
         """As json holds it."""
         return {
-            "healthy": self.healthy,
+            "answer": self.answer,
+            "why": self.why,
             "examined": self.examined,
             "findings": [one.to_json() for one in self.findings],
         }
+
+
+def told_answer(diagnosis: Mapping[str, Any]) -> str:
+    """The answer of a diagnosis as json holds it, in words, with why where it was not examined."""
+    if diagnosis["answer"] == "findings":
+        return f"{counted(len(diagnosis['findings']), 'finding')}."
+    return "Healthy." if diagnosis["answer"] == "healthy" else f"Not examined: {diagnosis['why']}."
 
 
 def named(states: np.ndarray, actions: np.ndarray | None = None) -> str:

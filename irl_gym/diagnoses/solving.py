@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from irl_gym.diagnoses.case import Case
 from irl_gym.diagnoses.findings import Finding
-from irl_gym.solvers import Status
+from irl_gym.status import Status
 
 FAR = 1e-3
 """A duality gap above this, in units of the objective, is far from the optimum."""
@@ -20,8 +20,8 @@ def _programs(case: Case) -> Iterator[tuple[str, dict]]:
 
 def inaccurate(case: Case) -> Finding | None:
     """The solver stopped short of its tolerances."""
-    short = [(name, one) for name, one in _programs(case) if one.get("status") == Status.INACCURATE.value]
-    if not short and case.status != Status.INACCURATE.value:
+    short = [(name, one) for name, one in _programs(case) if Status(one["status"]) is Status.INACCURATE]
+    if not short and case.status is not Status.INACCURATE:
         return None
     name, one = short[0] if short else ("reward", {})
     solver = str(one.get("solver", "the solver"))
@@ -38,7 +38,9 @@ def inaccurate(case: Case) -> Finding | None:
 
 def far_from_optimal(case: Case) -> Finding | None:
     """Weak duality, recomputed: no reward has a larger objective than the bound, and none with these margins is smaller."""
-    if case.claims.get("zero"):  # an objective of 0 is no unit; a zero reward has a finding of its own
+    if (
+        case.status is not None and not case.status.usable
+    ):  # an objective of 0 is no unit; a zero reward has a finding of its own
         return None
     gap, objective = case.claims.get("duality_gap"), case.claims.get("objective")
     if gap is not None and objective is not None and gap > _far(case, objective):

@@ -4,11 +4,11 @@ Findings name states by their rows, `s=13 a=2`. A reader of the command line kno
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 RECORDING = ("--expert", "--episodes", "--epsilon")
 """Flags that choose an expert and record its episodes: they say nothing to a run that was given a dataset."""
-_STATE = re.compile(r"\bs=(\d+)(?: a=(\d+))?")
+_STATE = re.compile(r"\bs=(\d{1,9})(?: a=(\d{1,9}))?")
 
 
 def usable_flags(flags: Iterable[str], *, given: bool = False) -> tuple[str, ...]:
@@ -19,6 +19,12 @@ def usable_flags(flags: Iterable[str], *, given: bool = False) -> tuple[str, ...
         given: the run was given a dataset, so that no flag records other episodes.
     """
     return tuple(one for one in flags if not (given and one.split()[0] in RECORDING))
+
+
+def named_in(sentence: str) -> Iterator[tuple[int, int | None]]:
+    """The rows that a sentence names, each with its action, if it has one."""
+    for found in _STATE.finditer(sentence):
+        yield int(found[1]), None if found[2] is None else int(found[2])
 
 
 def with_names(sentence: str, state_name: Callable[[int], str], actions: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.certificates import claims_in, read_certificate
-from irl_gym.claims import FIRST
+from irl_gym.claims import ENVIRONMENT, FIRST
 from irl_gym.datasets import read_minari
 from irl_gym.demonstrated import most_frequent
 from irl_gym.demonstrations import empirical_policy
@@ -19,7 +19,9 @@ from irl_gym.linear_reward import LinearReward, load_reward
 from irl_gym.own_files import check_links
 from irl_gym.policies import load_actions
 from irl_gym.rewards import TabularReward
-from irl_gym.run_folder import RECORDS, START, SURPRISES, changed, read_json, read_record
+from irl_gym.run_folder import START, changed, checked_record, read_json, read_record
+from irl_gym.run_schema import Config, Environment
+from irl_gym.status import Status
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation
 from irl_gym.told_spaces import told_space
@@ -31,26 +33,22 @@ def left_behind(path: Path) -> Case | None:
         check_links(path)
         if any(changed(path, read_record(path, stage) or {}) for stage in (START, *FIRST)):
             return None
-        config = read_json(path / "config.json")
-        space = told_space("observations", read_json(path / "environment.json")["observations"])
+        config = read_json(path / "config.json", Config)
+        space = told_space("observations", read_json(path / ENVIRONMENT, Environment)["observations"])
         table = load_table(path / TABLE, space)
-        record = _maybe(path / RECORDS / "reward.json")
+        record = read_record(path, "reward") or {}
         learned = load_reward(path / "reward.npz") if record else None
         expert = _expert(path, config, table)
         claims = claims_in(read_certificate(path / "certificate.json")) if record else {}
-    except (OSError, *SURPRISES, IrlGymError):
+    except (OSError, IrlGymError):
         return None
     reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
     if reward is not None and not isinstance(reward, TabularReward):
         return None
     return Case(
-        table.mdp, expert, reward, claims, record.get("status", ""), record.get("stats", {}), table.reward,
+        table.mdp, expert, reward, claims, Status(record["status"]) if record else None, record.get("stats", {}), table.reward,
         bool(config.get("shaping")), weights=learned.alpha if isinstance(learned, LinearReward) else None,
     )  # fmt: skip
-
-
-def _maybe(path: Path) -> dict[str, Any]:
-    return read_json(path) if path.exists() else {}
 
 
 def _expert(path: Path, config: dict[str, Any], table: Tabulation) -> np.ndarray:
@@ -64,7 +62,8 @@ def seen_with_noise(path: Path, table: Tabulation) -> np.ndarray:
 
     Raises:
         DatasetMissing: the run's demonstrations are gone.
+        OSError, DamagedFile: so is the record of them, or it is none.
     """
-    dataset_id = read_json(path / RECORDS / "demonstrations.json")["dataset_id"]
-    episodes = list(read_minari(dataset_id, root=path / "dataset"))
+    record = checked_record(path, "demonstrations")
+    episodes = list(read_minari(record["dataset_id"], root=path / "dataset"))
     return most_frequent(empirical_policy(episodes, table.states, table.mdp.n_actions))

@@ -47,7 +47,7 @@ class IRLResult(Generic[AnyReward, AnyProof]):
     reward: AnyReward
     """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
     status: Status
-    """What became of the program, in a sentence."""
+    """What became of the program; `status.sentence` says it."""
     proof: AnyProof
     """What the learner proves of its program, such as a FiniteProof; what the reward says of the expert, `certify` tells."""
     stats: Mapping[str, Any] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class IRLResult(Generic[AnyReward, AnyProof]):
     def facts(self) -> tuple[Fact, ...]:
         """What became of the program, and what the proof says."""
         mood = "plain" if self.status is Status.OPTIMAL else "open" if self.status is Status.INACCURATE else "bad"
-        return (Fact("status of the program", self.status.value, mood), *self.proof.facts())
+        return (Fact("status of the program", self.status.sentence, mood), *self.proof.facts())
 
     def record(self) -> dict[str, Any]:
         """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""

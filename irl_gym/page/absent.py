@@ -37,7 +37,7 @@ LACKS: Mapping[str, Lack] = {
     "widths": Lack(
         WIDTHS, "How wide the feasible set is was not worked out for this run.", ("no_widths", "no_ambiguity")
     ),
-    "diagnosis": Lack(DOCTOR, "The doctor did not look at this run.", ("no_diagnosis",)),
+    "diagnosis": Lack(DOCTOR, "The doctor did not look at this run: an earlier version of irl_gym made it."),
     "told_of_table": Lack(
         TABLE,
         "There is no table: the environment was stepped, and everything is estimated from episodes. So this page has no "

@@ -12,6 +12,7 @@ from typing import Any
 
 from irl_gym import measures
 from irl_gym.certificates import facts_in
+from irl_gym.diagnoses.findings import told_answer
 from irl_gym.errors import InvalidParameter
 from irl_gym.measures import explained, shown
 from irl_gym.page import compared
@@ -27,8 +28,6 @@ from irl_gym.page.sections import Section, specs
 from irl_gym.page.verdict import answer, how
 from irl_gym.page.worlds import one_world, run_places, run_title
 from irl_gym.pooling import pools
-from irl_gym.run_folder import SURPRISES
-from irl_gym.run_reader import not_understood
 from irl_gym.runs import Run
 from irl_gym.scores import REFERENCES, agent_of, called, others
 from irl_gym.shares import judged
@@ -49,26 +48,12 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
 
     Raises:
         InvalidParameter: fewer or more runs, or a folder of the file's own name.
-        RunIncomplete: a run whose files cannot be understood, by its folder.
     """
     if not 2 <= len(runs) <= MOST_RUNS:
         raise InvalidParameter(f"runs has {len(runs)} of them: expected 2 to {MOST_RUNS} to put side by side.")
     named = lettered(runs)
-    try:
-        context, data = _page(named)
-    except SURPRISES:
-        _find_fault(named)
-        raise
+    context, data = _page(named)
     write_page(path, "compare.html", context, data, SCRIPTS)
-
-
-def _find_fault(named: Mapping[str, Run]) -> None:
-    """Name the run whose page cannot be made even alone."""
-    for letter, run in named.items():
-        try:
-            _page({letter: run})
-        except SURPRISES as error:
-            raise not_understood(error, run.path) from error
 
 
 def lettered(runs: Sequence[Run]) -> dict[str, Run]:
@@ -241,15 +226,14 @@ def _proofs(named: Mapping[str, Run]) -> Section:
 
 def _doctors(named: Mapping[str, Run]) -> Section:
     """What the doctor says of each run."""
-    findings, seen = [], {letter: run for letter, run in named.items() if run.diagnosis is not None}
-    for letter, run in seen.items():
-        for one in (run.diagnosis or {}).get("findings", ()):
-            told = finding(run, one)
+    findings = []
+    answers: dict[str, list[str]] = {}
+    for letter, run in named.items():
+        said = told_answer(run.diagnosis) if run.diagnosis else "Not looked at, by the earlier version of irl_gym that made it."
+        answers.setdefault(said, []).append(letter)
+        for one in run.diagnosis["findings"] if run.diagnosis else ():
+            told = finding(one, run.worded, given=run.config.get("dataset") is not None)
             findings.append({**told, "name": f"run {letter}: {told['name']}"})
-    unseen = [letter for letter in named if letter not in seen]
-    missed = f"The doctor did not look at run{'s' * (len(unseen) > 1)} {', '.join(unseen)}." if unseen else ""
-    lead = "What is to be said against each reward, and what to do about it." if findings else ""
-    if seen and not findings:
-        of = "the others" if unseen else "these runs"
-        lead = f"The doctor has nothing to complain about in {of}."
-    return Section("doctor", "Doctor", f"{missed} {lead}".strip(), (), "doctor", {"findings": findings})
+    lead = "What is to be said against each reward, and what to do about it. " if findings else ""
+    lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())
+    return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})

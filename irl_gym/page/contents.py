@@ -1,6 +1,6 @@
 """What the sections of a page may need of a run, by name, beside the run's own fields; None what it has not got."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ class Contents:
     """Supplies sections (`irl_gym.needs`)."""
 
     run: Run
-    """For sections that are still functions of all of it: to be joined, then nothing asks for it by name."""
+    """What it is the contents of."""
 
     @cached_property
     def scene(self) -> Scene | None:
@@ -30,6 +30,16 @@ class Contents:
         told = run.metrics.get("demonstrations", {})
         by_episodes = bool(told.get("episodes_only", False))
         return Scene(run.table, learned, run.expert, run.agent, run.actions, run.state_name, run.grid, by_episodes)
+
+    @property
+    def worded(self) -> Callable[[str], str]:
+        """Names the states and actions in a sentence."""
+        return self.run.worded
+
+    @property
+    def given(self) -> bool:
+        """Was a dataset given, in place of an expert?"""
+        return self.run.config.get("dataset") is not None
 
     @property
     def weights(self) -> TabularReward | LinearReward | None:

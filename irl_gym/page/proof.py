@@ -1,17 +1,17 @@
 """The certificate in words, and the doctor's sentences."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from irl_gym.certificates import facts_in
-from irl_gym.diagnoses.spoken import usable_flags, with_names
+from irl_gym.diagnoses.findings import told_answer
+from irl_gym.diagnoses.spoken import usable_flags
 from irl_gym.estimated import errors_told
-from irl_gym.page.absent import TABLE
+from irl_gym.page.absent import DOCTOR, TABLE
 from irl_gym.page.sections import Section
-from irl_gym.runs import Run
 from irl_gym.tabulation import Tabulation
-from irl_gym.written import counted, number, sentence_of
+from irl_gym.written import counted, number
 
 ROUNDING = 1e-7
 """A gap to the program's optimum below this share of the objective is none."""
@@ -37,26 +37,26 @@ def whence(recomputed: bool) -> str:
     return "computed again for this page" if recomputed else "the run's own record"
 
 
-def doctor(run: Run) -> Section:
-    """The doctor's findings with their mends."""
-    title = "Doctor"
-    if run.diagnosis is None:
-        why = sentence_of(run.stages.get("ambiguity", {}).get("no_diagnosis"))
-        return Section("doctor", title, f"The doctor did not look at this run. {why}".strip())
-    findings = [finding(run, one) for one in run.diagnosis.get("findings", ())]
-    lead = "What a careful reader would ask of this reward, and what to do about it."
-    if not findings:
-        lead = f"The doctor has nothing to complain about. {sentence_of(run.diagnosis.get('examined'))}".strip()
-    return Section("doctor", title, lead, (), "doctor", {"findings": findings})
+def doctor(diagnosis: Mapping[str, Any], worded: Callable[[str], str], given: bool) -> Section:
+    """The doctor's answer, and findings with their mends."""
+    findings = [finding(one, worded, given=given) for one in diagnosis["findings"]]
+    lead = "What a careful reader would ask of this reward, and what to do about it. " if findings else ""
+    lead += f"{told_answer(diagnosis)} {diagnosis['examined']}"
+    return Section(*DOCTOR, lead.strip(), (), "doctor", {"findings": findings})
 
 
-def finding(run: Run, found: Mapping[str, Any]) -> dict[str, str]:
-    """A finding as diagnosis.json holds it, in words: states and actions by their names, and its mend with flags."""
-    sentence, mend = str(found.get("sentence", "")), str(found.get("mend", ""))
-    flags = usable_flags(found.get("flags") or (), given=run.config.get("dataset") is not None)
+def finding(found: Mapping[str, Any], worded: Callable[[str], str], *, given: bool) -> dict[str, str]:
+    """A finding as diagnosis.json holds it, in words: states and actions by their names, and its mend with flags.
+
+    Args:
+        found: the finding.
+        worded: names the states and actions in a sentence.
+        given: was a dataset given? Then some flags cannot be.
+    """
+    mend, flags = found["mend"], usable_flags(found["flags"], given=given)
     return {
-        "name": str(found.get("name", "")).replace("_", " ").replace("-", " "),
-        "sentence": sentence if run.table is None else with_names(sentence, run.state_name, run.actions),
+        "name": found["name"].replace("-", " "),
+        "sentence": worded(found["sentence"]),
         "mend": f"{mend} On the command line: {', '.join(flags)}." if flags else mend,
     }
 

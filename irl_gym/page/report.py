@@ -92,11 +92,6 @@ def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | 
     return told
 
 
-def _doctor(run: Run, diagnosis: Mapping[str, Any]) -> Section:
-    """To be joined: `proof.doctor` shall be a function of the diagnosis, and what it says where there is none go."""
-    return doctor(run)
-
-
 SECTIONS: tuple[Callable[..., Section], ...] = (
     policies_table,
     compared.rewards,
@@ -108,7 +103,7 @@ SECTIONS: tuple[Callable[..., Section], ...] = (
     training.learning,
     episodes.episodes,
     proved,
-    _doctor,
+    doctor,
     table_facts,
     stages_table,
     asked,

@@ -101,7 +101,7 @@ def _named(sentence: str, scene: Scene) -> str:
         *others, last = (f"({scene.name(int(row))})" for row in found[1].split(", "))
         return f"{', '.join(others)} and {last}" if others else last
 
-    if not set(map(int, re.findall(r"\d+", " ".join(STATES.findall(sentence))))) <= set(range(scene.mdp.n_states)):
+    if not set(re.findall(r"\d+", " ".join(STATES.findall(sentence)))) <= set(map(str, range(scene.mdp.n_states))):
         return sentence
     return STATES.sub(called, sentence)
 

@@ -28,7 +28,6 @@ from irl_gym.planners import ValueIteration
 from irl_gym.policies import as_distribution
 from irl_gym.report import print_report
 from irl_gym.run_folder import RunFolder, read_record
-from irl_gym.run_reader import understood
 from irl_gym.runs import read_run
 from irl_gym.table_files import kept_table
 
@@ -56,19 +55,16 @@ def write_page(folder):
 
 
 def read_page(folder):
-    with understood(folder):
-        write_report(read_run(folder), folder.parent / "page.html")
+    write_report(read_run(folder), folder.parent / "page.html")
 
 
 def read_comparison(folder):
-    with understood(folder):
-        write_comparison([read_run(folder.parent / "clean"), read_run(folder)], folder.parent / "page.html")
+    write_comparison([read_run(folder.parent / "clean"), read_run(folder)], folder.parent / "page.html")
 
 
 def read_diagnosis(folder):
-    with understood(folder):
-        diagnose_unfinished(folder)
-        found = diagnose_run(read_run(folder))
+    diagnose_unfinished(folder)
+    found = diagnose_run(read_run(folder))
     assert found.examined and all(one.sentence and one.mend for one in found.findings)
 
 

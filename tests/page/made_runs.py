@@ -134,11 +134,12 @@ def widths_of(table, learned):
 
 def diagnosis_of(acting):
     return {
-        "healthy": False,
-        "examined": "the table",
+        "answer": "findings",
+        "why": None,
+        "examined": "Examined: the table.",
         "findings": [
             {"name": "ties", "sentence": "Two actions are <b>tied</b>.", "mend": "Try --margin-cap auto.",
-             "states": acting[:3].tolist(), "actions": [0, 1, 0]},
+             "states": acting[:3].tolist(), "actions": [0, 1, 0], "flags": []},
         ],
     }  # fmt: skip
 
@@ -196,7 +197,7 @@ def stepped_run(path, *, seed=0):
     certificate = certificate_of(sampled(gaps=np.array([1.0]), gap_errors=np.array([0.1]), n_features=60), None, episodes=True)
     metrics = {
         "policies": policies, "table": None, "training": {"environment_steps": 60_000, "steps_to_0.99": None},
-        "reward": {"learner": "TrajectoryLP", "status": "Optimal.", "rounds": 5, "best_round": 3,
+        "reward": {"learner": "TrajectoryLP", "status": "optimal", "rounds": 5, "best_round": 3,
                    **reward_told(certificate)},
         "demonstrations": {"given": False, "episodes_only": True, "episodes": 10, "dataset": "made-v0"},
     }  # fmt: skip
@@ -212,5 +213,6 @@ def stepped_run(path, *, seed=0):
         curve=Curve(*np.array([[0.0, 30_000, 60_000], [20, 60, 85], [22, 200, 450], [20, 150, 420], [24, 240, 480]])),
         stages={"agent": {"seconds": 50.0, "environment_steps": 60_000}}, grid=None,
         films={"agent": Film("agent", 3, tuple(moments), "cut", (), "webp", "pygame is not installed.")},
-        diagnosis={"healthy": True, "findings": []}, widths=None, lambda_path=None, vouched=True,
+        diagnosis={"answer": "healthy", "why": None, "examined": "Examined: it.", "findings": []},
+        widths=None, lambda_path=None, vouched=True,
     )  # fmt: skip

@@ -8,13 +8,13 @@ from page.made_runs import NO_CURVE, stepped_run, table_run
 from irl_gym.page.absent import LACKS
 from irl_gym.page.report import sections_of
 
-WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths", "no_diagnosis")}}
+WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths")}}
 WITHOUT = {
     "curve": ({"curve": NO_CURVE}, "learning", "was planned exactly, not trained"),
     "films": ({"films": {}}, "episodes", "No episode of this run was filmed."),
     "lambda_path": ({"lambda_path": None}, "lambda", "was not worked out for this run. Of no_path."),
     "widths": ({"widths": None}, "widths", "was not worked out for this run. Of no_widths."),
-    "diagnosis": ({"diagnosis": None}, "doctor", "The doctor did not look at this run. Of no_diagnosis."),
+    "diagnosis": ({"diagnosis": None}, "doctor", "The doctor did not look at this run: an earlier version of irl_gym made it."),
     "told_of_table": ({}, "table", "There is no table: the environment was stepped"),
 }  # fmt: skip
 

@@ -47,10 +47,12 @@ def test_the_verdict_says_why_there_is_no_score(tmp_path):
 def test_the_doctors_mends_name_their_flags(tmp_path):
     run = table_run(tmp_path, films=False)
     found = {"name": "ties", "sentence": "Tied in s=6 a=2.", "mend": "Capped.", "flags": ["--margin-cap auto", "--l1 0"]}
-    (told,) = doctor(replace(run, diagnosis={"healthy": False, "findings": [found]})).shown["findings"]
+    diagnosis = {"answer": "findings", "why": None, "examined": "", "findings": [found]}
+    (told,) = section_of(doctor, replace(run, diagnosis=diagnosis)).shown["findings"]
     assert told["mend"] == "Capped. On the command line: --margin-cap auto, --l1 0."
 
 
 def test_the_doctors_sentences_name_states_and_actions(tmp_path):
-    told = finding(table_run(tmp_path, films=False), {"name": "ties", "sentence": "Tied in s=6 a=2.", "states": [6]})
-    assert told == {"name": "ties", "sentence": "Tied in s=6 a=2 (row 1, column 2; right).", "mend": ""}
+    found = {"name": "ties", "sentence": "Tied in s=6 a=2.", "mend": "Cap.", "states": [6], "flags": []}
+    told = finding(found, table_run(tmp_path, films=False).worded, given=False)
+    assert told == {"name": "ties", "sentence": "Tied in s=6 a=2 (row 1, column 2; right).", "mend": "Cap."}

@@ -70,9 +70,14 @@ def test_the_slider_calls_states_as_figures_do(lake):
     assert data["pieces"][0]["change"] == "At price 1 the reward of (row 1, column 0) and (row 3, column 2) becomes 0."
 
 
-def test_a_healthy_doctor_says_what_was_examined(lake):
-    found = doctor(replace(lake, diagnosis={"healthy": True, "findings": [], "examined": "Examined: 53 states"}))
-    assert found.lead.endswith("Examined: 53 states.")
+@pytest.mark.parametrize(
+    ("answer", "why", "told"), [("healthy", None, "Healthy."), ("not examined", "it is gone", "Not examined: it is gone.")]
+)
+def test_a_doctor_without_findings_says_what_was_examined(lake, answer, why, told):
+    found = section_of(
+        doctor, lake, diagnosis={"answer": answer, "why": why, "findings": [], "examined": "Examined: 53 states."}
+    )
+    assert found.lead == f"{told} Examined: 53 states."
 
 
 def test_the_worst_tie_says_of_what_it_loses(lake):

@@ -46,7 +46,9 @@ def test_the_one_damaged_run_of_many_is_named_alone(script, finished):
         '{"policies": [], "table": {"states": 16}, "reward": "good"}'
     )
     made = script("compare", "plain", "priced", "damaged", cwd=finished)
-    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: damaged cannot be understood"), made.stderr
+    assert made.returncode == 2 and made.stderr.startswith(
+        "RunIncomplete: damaged is incomplete: metrics.json cannot be read"
+    ), made.stderr
 
 
 def test_json_that_is_nested_too_deeply_gets_one_clear_line(script, finished):

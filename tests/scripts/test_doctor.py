@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from forgetting import without_digests
 
-from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
+from irl_gym.diagnosis import CHECKS, diagnose_run, diagnose_unfinished
 from irl_gym.experiment import Experiment
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.learners.trajectory import TrajectoryLP
@@ -48,6 +48,16 @@ def test_a_healthy_run_exits_with_0(doctor, runs):
 def test_findings_exit_with_1_and_are_printed_with_their_mends(doctor, runs):
     done = doctor(runs / "paper")
     assert done.returncode == 1 and "avoidable-ties" in done.stdout and 'Mend: margin_cap="auto"' in done.stdout
+
+
+def test_a_run_whose_demonstrations_are_gone_is_not_called_healthy(doctor, runs, tmp_path):
+    out = shutil.copytree(runs / "noisy", tmp_path / "gone")
+    shutil.rmtree(out / "dataset")
+    done = doctor(out)
+    assert done.returncode == 3 and done.stdout.startswith(
+        "Not examined: what the expert was seen to do cannot be read any more"
+    )
+    assert "Healthy" not in done.stdout
 
 
 def test_what_is_a_record_and_not_computed_is_said(doctor, runs):
@@ -120,7 +130,9 @@ def test_an_expert_with_noise_is_judged_by_what_its_episodes_show(runs):
 
 
 def test_an_unfinished_run_with_its_reward_is_diagnosed_as_a_finished_one(runs):
-    assert diagnose_unfinished(runs / "paper").to_json() == diagnose_run(read_run(runs / "paper")).to_json()
+    unfinished, finished = diagnose_unfinished(runs / "paper"), diagnose_run(read_run(runs / "paper"))
+    assert unfinished.to_json()["findings"] == finished.to_json()["findings"]
+    assert unfinished.examined == f"{finished.examined} Not examined, of {len(CHECKS)} questions: 5, as no run judged it."
 
 
 def test_a_folder_that_holds_too_little_has_no_diagnosis(tmp_path):

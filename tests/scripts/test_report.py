@@ -43,7 +43,30 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     (copied / "run" / "metrics.json").write_text(json.dumps({"policies": [], "table": {"states": 16}, "reward": "good"}))
     made = script(name, "--run", "run", cwd=copied)
     assert "Traceback" not in made.stderr and made.stderr.count("\n") <= 1
-    assert made.returncode == 2 and made.stderr.startswith("RunIncomplete: run cannot be understood")
+    assert made.returncode == 2 and made.stderr.startswith(
+        "RunIncomplete: run is incomplete: metrics.json cannot be read (DamagedFile: its policies is []"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "place"),
+    [
+        ("report", ("--run", "run"), "irl_gym.page.report.write_report"),
+        ("doctor", ("--run", "run"), "irl_gym.diagnosis.diagnose_run"),
+        ("compare", ("run", "run"), "irl_gym.page.comparison.write_comparison"),
+        ("doctor", ("--run", "run"), "irl_gym.runs.claims"),
+    ],
+)
+def test_a_defect_is_called_one_and_is_told_with_its_traceback(script, copied, monkeypatch, name, arguments, place):
+    def broken(*_):
+        raise KeyError("policies")
+
+    monkeypatch.setattr(place, broken)
+    made = script(name, *arguments, cwd=copied)
+    told = (
+        "This is a defect of irl_gym, not of your files: KeyError: 'policies'. Please report it with this traceback:\nTraceback"
+    )
+    assert made.returncode == 70 and made.stderr.startswith(told) and "in broken" in made.stderr
 
 
 def test_a_page_that_cannot_be_written_gets_one_clear_line(script, planned, tmp_path):

@@ -32,7 +32,6 @@ from irl_gym.datasets import load_minari, read_minari, write_minari
 from irl_gym.demonstrated import most_frequent, visits
 from irl_gym.demonstrations import EmpiricalPolicy, Episode, empirical_policy
 from irl_gym.endings import in_table, left_out
-from irl_gym.errors import NotTabular
 from irl_gym.evaluation import evaluate
 from irl_gym.experiment import Experiment, as_config
 from irl_gym.given import FromFile
@@ -247,8 +246,7 @@ class Loop:
             solver = self.experiment.inner or world.expert()
             result = learner.fit(Simulator(self.env, solver, world.gamma, table, world.num_envs), self.demonstrations)
             return replace(result, stats={**result.stats, "inner": type(solver).__name__})
-        if not isinstance(world, TableWorld):
-            raise NotTabular(f"{self.env} has no table: expected one for {type(learner).__name__}. Use TrajectoryLP.")
+        assert isinstance(world, TableWorld)  # `place_of` makes no other world for other learners
         if isinstance(learner, FeatureLP):
             return learner.fit(world.table.mdp, self.known_expert, states=world.table.states)
         if isinstance(learner, FiniteLP) and self.seen is not None:

@@ -85,8 +85,8 @@ def _told_finite(reward: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         return
     ties = reward["marginless_states"] - reward["violated_states"]
     if ties > 0:
-        on_states = reward.get("reward_on") == "state"
-        mend = " Try --margin-cap auto." if cap is None else " Try --reward-on state-action." if on_states else ""
+        other = " Try --reward-on state-action." if reward.get("reward_on") == "state" else ""
+        mend = " Try --margin-cap auto --l1 0." if cap is None or reward["l1"] > 0 else other
         yield "states where it leaves ties", f"{ties}: the expert has no margin there.{mend}"
     if reward.get("unbreakable_states"):
         kind = "state reward" if reward.get("reward_on") == "state" else "reward"

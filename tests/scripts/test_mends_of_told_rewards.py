@@ -5,10 +5,12 @@ import pytest
 from irl_gym import figures
 
 CUT, OPEN, SHORT = 'desc=["SFF","HFG"]', 'desc=["SFF","FFG"]', 'desc=["SFG"]'
+PROGRAM = ("--margin-cap", "auto", "--l1", "0")
 SAMPLED = ("--table", "sample", "--steps")
 LINEAR = ("--learner", "feature-lp", "--features", "radial", "--size")
 CASES = [
-    ("the expert has no margin there.", "Try --margin-cap auto", (CUT, "--margin-cap", "none"), (CUT, "--margin-cap", "auto")),
+    ("the expert has no margin there.", "Try --margin-cap auto --l1 0.", (CUT, "--margin-cap", "none"), (CUT, *PROGRAM)),
+    ("the expert has no margin there.", "Try --margin-cap auto --l1 0.", (CUT, "--l1", "auto"), (CUT, *PROGRAM)),
     ("the expert has no margin there.", "Try --reward-on state-action.",
      (CUT, "--margin-cap", "0.5"), (CUT, "--margin-cap", "0.5", "--reward-on", "state-action")),
     ("there an action has the expert's successors.", "Try --reward-on state-action.",

@@ -123,6 +123,8 @@ CASES = [
      lambda: of(PARTLY, FiniteLP(slack=10.0), visits=[99, 99, 99, 99, 99])),
     ("expert-not-optimal", 'reward_on="state-action"; or slack=10.0, if the expert errs.',
      lambda: by_hand(AGAINST, [0, 0.1, 0.2, 0.3]), lambda: of(AGAINST, ON_STEPS)),
+    ("expert-not-optimal", 'margin_cap="auto"; if it stays, more or other features, a larger S_0, or FiniteLP.',
+     lambda: grid(FeatureLP(np.eye(25))), lambda: grid(FeatureLP(np.eye(25), margin_cap="auto")), lambda: grid(OWN)),
     ("expert-not-optimal", "More or other features; a larger S_0; or FiniteLP, where the table is small enough.",
      lambda: grid(FeatureLP(RANDOM, S_0=3, margin_cap="auto")),
      lambda: grid(FeatureLP(np.eye(25), S_0=25, margin_cap="auto")), lambda: grid(OWN)),

@@ -55,11 +55,11 @@ def _text(node):
 
 
 VERBS = (
-    "add|ask|call|choose|clip|convert|copy|correct|count|delete|divide|draw|drop|fill|fix|flatten|give|hold|import|install|keep|"
-    "leave|let|list|load|lower|make|mend|move|name|normalise|number|open|pass|put|raise|read|record|remove|rename|rescale|retrain|"
-    "run|save|scale|shift|show|sort|stack|take|train|try|turn|upgrade|use|wait|wrap|write"
+    "add|ask|call|choose|clip|convert|copy|correct|count|delete|discretise|divide|draw|drop|fill|fix|flatten|give|hold|import|"
+    "install|keep|learn|leave|let|list|load|look|lower|make|mend|move|name|normalise|number|open|pass|put|raise|read|record|"
+    "register|remove|rename|rescale|retrain|run|save|scale|shift|show|sort|stack|take|train|try|turn|upgrade|use|wait|wrap|write"
 )
-ASKS = re.compile(rf"(?:^ ?(?=[A-Z])|(?<=[.:;?,] ))(?:[Oo]r |and |then )?((?:Have|More|(?i:{VERBS})) [^.,;:\0]{{2,}})")
+ASKS = re.compile(rf"(?:^ ?(?=[A-Z])|(?<=[.:;?,] ))(?:[Oo]r |and |then )?((?:Cut|Have|More|Play|(?i:{VERBS})) [^.,;:\0]{{2,}})")
 """What asks a reader to do something: from a verb with which a sentence, or a part of it, begins to the next sign or value."""
 
 

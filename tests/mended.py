@@ -54,6 +54,25 @@ def _text(node):
     return "".join(one.value if isinstance(getattr(one, "value", 0), str) else "\0" for one in parts)
 
 
+VERBS = (
+    "add|ask|call|choose|clip|convert|copy|correct|count|delete|discretise|divide|draw|drop|fill|fix|flatten|give|hold|import|"
+    "install|keep|learn|leave|let|list|load|look|lower|make|mend|move|name|normalise|number|open|pass|put|raise|read|record|"
+    "register|remove|rename|rescale|retrain|run|save|scale|shift|show|sort|stack|take|train|try|turn|upgrade|use|wait|wrap|write"
+)
+ASKS = re.compile(rf"(?:^ ?(?=[A-Z])|(?<=[.:;?,] ))(?:[Oo]r |and |then )?((?:Cut|Have|More|Play|(?i:{VERBS})) [^.,;:\0]{{2,}})")
+"""What asks a reader to do something: from a verb with which a sentence, or a part of it, begins to the next sign or value."""
+
+
+def asked(file):
+    """What the texts of a file ask a reader to do, wherever they stand in it, and the lines."""
+    tree = ast.parse(file.read_text())
+    silent = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)}  # the docstrings
+    silent |= {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    for node in ast.walk(tree):
+        if node not in silent and isinstance(node, ast.JoinedStr | ast.Constant):
+            yield from ((node.lineno, one.strip()) for one in ASKS.findall(_text(node)))
+
+
 def told(breaks, *given):
     """What the error says that something breaks with."""
     with pytest.raises((errors.IrlGymError, FileNotFoundError)) as caught:

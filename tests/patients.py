@@ -35,6 +35,12 @@ def finding(name, result, mdp, expert, **known):
     return next(one for one in doctor(result, mdp, expert, **known).findings if one.name == name)
 
 
+def check_mends(name, says, ill, mended):
+    """The finding of this name says this mend in one diagnosis, and is in none of those of what was done about it."""
+    assert says in next((one.mend for one in ill().findings if one.name == name), "")
+    assert [number for number, each in enumerate(mended) if name in each().names] == []
+
+
 def corridor(length, gamma):
     """Cells in a row from 0, left (0) and right (1); the last cell is terminal."""
     P = np.zeros((length, 2, length))

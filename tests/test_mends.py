@@ -30,6 +30,7 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.minari_files import identity
 from irl_gym.places import place_of
 from irl_gym.policies import as_distribution
+from irl_gym.reveal import Reveal
 from irl_gym.seeded_starts import SeededStarts
 from irl_gym.tabulate import make, tabulate
 
@@ -54,6 +55,7 @@ def test_a_goal_that_resets_draw_is_sent_to_seeded_starts_first():
     env = Goal()
     message = error_of(env, HiddenState)
     assert "goal_xy[1]: " in message and mends(message)[0].startswith("irl_gym.seeded_starts.SeededStarts")
+    assert "no step changes it: fix what they draw, with `" in message and "; or show it in the observation, with `" in message
     table = tabulate(done(mends(message)[0], env), gamma=GAMMA)
     assert table.evidence.exact and table.mdp.n_states == 7
 
@@ -116,6 +118,9 @@ class Clocked(Corridor):
 def test_a_counter_can_be_revealed_or_counted_on_average():
     env = Clocked()
     message = error_of(env, HiddenState)
+    assert (
+        "Show what is hidden in the observation, with `" in message and "; or count what happens on average, with `" in message
+    )
     assert tabulate(revealed(env), gamma=GAMMA).evidence.exact
     assert not done(mends(message)[-1], env).evidence.exact
 
@@ -137,6 +142,19 @@ def test_a_hidden_float_is_counted_on_average():
     env = Drifts()
     message = error_of(env, HiddenState)
     assert "drift: " in message and not done(mends(message)[-1], env).evidence.exact
+    assert "give the environment an integer attribute that says it, and name that, as in `" in message
+
+
+class Quartered(Drifts):
+    """The same, with an integer that says it."""
+
+    @property
+    def quarters(self):
+        return int(4 * self.drift)
+
+
+def test_a_hidden_float_is_revealed_by_an_integer_that_says_it():
+    assert tabulate(Reveal(Quartered(), {"quarters": 5}), gamma=GAMMA, check_steps=500).evidence.exact
 
 
 class Cells(gymnasium.ObservationWrapper):
@@ -153,7 +171,7 @@ class Cells(gymnasium.ObservationWrapper):
 def test_a_continuous_state_that_cells_hide_is_sent_to_cells_of_its_own():
     env = Cells()
     message = error_of(env, HiddenState, by=Enumeration(start_runs=300, runs=50))
-    assert done(mends(message)[0], env).mdp.n_states >= 400
+    assert "Make cells of the state itself, with `" in message and done(mends(message)[0], env).mdp.n_states >= 400
 
 
 # --- generators, constructors, rows ---
@@ -243,21 +261,21 @@ class Locked(Corridor):
 
 
 OFFERED = {
-    "words": (Shows(*SHOWN["words"]), NotDiscrete, False),
-    "raises": (Raises(), EnvironmentFailed, False),
-    "locked": (Locked(), NotCopied, False),
-    "renewing": (Renewing(), NotTabular, True),
-    "clocked": (Clocked(), HiddenState, True),
+    "words": (Shows(*SHOWN["words"]), NotDiscrete, ""),
+    "raises": (Raises(), EnvironmentFailed, ""),
+    "locked": (Locked(), NotCopied, ""),
+    "renewing": (Renewing(), NotTabular, "Or count what random steps do (--table sample)."),
+    "clocked": (Clocked(), HiddenState, "--table sample"),
 }
 
 
 @pytest.mark.parametrize("name", OFFERED)
 def test_counting_is_offered_by_a_run_where_it_does_not_lead_to_the_same_error(tmp_path, name):
-    env, error, serves = OFFERED[name]
+    env, error, says = OFFERED[name]
     with pytest.raises(error) as caught:
         place_of(Experiment("Corridor-v0", GAMMA, learner=FiniteLP()), env, tmp_path, lambda share: None)
-    assert ("--table sample" in str(caught.value)) == serves
-    if serves:
+    assert says in str(caught.value) and bool(says) == ("--table sample" in str(caught.value))
+    if says:
         assert tabulate(env, gamma=GAMMA, by=Interaction(500)).mdp.n_states == 7
     else:
         with pytest.raises(error):

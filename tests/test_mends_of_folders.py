@@ -1,6 +1,7 @@
 """The mends that errors about folders of runs, files and exports name are executed, and serve."""
 
 import errno
+import json
 import os
 import re
 import shutil
@@ -9,11 +10,12 @@ import gymnasium
 import numpy as np
 import pytest
 from mended import told, unsaid
+from minari.serialization import serialize_space
 from numbered import Numbered
 
 from irl_gym import archives
 from irl_gym.archives import read_arrays
-from irl_gym.datasets import described
+from irl_gym.datasets import described, load_minari
 from irl_gym.export import Amount, export_dataset
 from irl_gym.own_files import held, write_bytes
 from irl_gym.run_folder import RunFolder
@@ -119,6 +121,16 @@ def compressed(path, save=np.savez_compressed):
         return read_arrays(path / "one.npz")["one"].size
 
 
+def told_of(path, **taken):
+    """A dataset whose metadata lack what is None."""
+    about = described("lake/told-v0", LAKE, None, None, "hdf5", {"algorithm_name": "numbers"})
+    if not (path / "lake").exists():
+        export_dataset(lambda folder: Numbered(), about, Amount(episodes=1), {}, root=path)
+    file = path / "lake/told-v0/data/metadata.json"
+    file.write_text(json.dumps({name: one for name, one in (json.loads(file.read_text()) | taken).items() if one is not None}))
+    return load_minari("lake/told-v0", root=path)
+
+
 # --- exports ---
 
 
@@ -213,6 +225,8 @@ CASES = [
     ("expected what a run leaves. Delete it.",
      lambda path: hold(piped(path / "run")), lambda path: without(path / "run" / "one") and hold(path / "run")),
     ("If it is yours, write it without compression", compressed, lambda path: compressed(path, np.savez) == 100_000),
+    ("add it, as minari.serialization.serialize_space writes it", lambda path: told_of(path, observation_space=None),
+     lambda path: told_of(path, observation_space=serialize_space(LAKE.observation_space))),
     # exports
     ("Give one that goes on.", lambda root: export(root, Ends()), export),
     ("expected what an export of yours left. Delete it.",

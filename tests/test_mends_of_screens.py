@@ -129,6 +129,7 @@ CASES = [
     ("expected name=value, such as map_name=8x8.",
      lambda _: asked("--env-kwargs", "8x8"), lambda _: asked("--env-kwargs", "map_name=8x8").env_kwargs == {"map_name": "8x8"}),
 ]  # fmt: skip
+ELSEWHERE = "Learn from it with"  # scripts/test_play.py: test_the_script_says_what_happened_and_how_to_learn_from_it
 FILES = ["playing.py", "screens.py", "keyboard.py", "arguments.py", "diagnosis.py", "report.py", "page/comparison.py"]
 
 

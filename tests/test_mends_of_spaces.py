@@ -52,13 +52,18 @@ class Does(Corridor):
         return self.moved(self.read(action))
 
 
+NUMBER = "Number its combinations, with"
 ACTIONS = {
-    "several": (spaces.MultiDiscrete([2, 3]), lambda a: int(a[0])),
-    "several from others": (spaces.MultiDiscrete([2, 3], start=[-1, 4]), lambda a: int(a[0]) + 1),
-    "a map of several": (spaces.MultiDiscrete([[2, 2], [2, 1]]), lambda a: int(a[0, 1])),
-    "bits": (spaces.MultiBinary(3), lambda a: int(a[1])),
-    "numbers": (spaces.Box(-1, 1, (1,)), lambda a: int(a[0] > 0)),
-    "numbers without bounds": (spaces.Box(-np.inf, np.inf, (2,)), lambda a: int(a[1] > 0)),
+    "several": (spaces.MultiDiscrete([2, 3]), lambda a: int(a[0]), NUMBER),
+    "several from others": (spaces.MultiDiscrete([2, 3], start=[-1, 4]), lambda a: int(a[0]) + 1, NUMBER),
+    "a map of several": (spaces.MultiDiscrete([[2, 2], [2, 1]]), lambda a: int(a[0, 1]), NUMBER),
+    "bits": (spaces.MultiBinary(3), lambda a: int(a[1]), NUMBER),
+    "numbers": (spaces.Box(-1, 1, (1,)), lambda a: int(a[0] > 0), "Take some of them, such as 5 along each axis, with"),
+    "numbers without bounds": (
+        spaces.Box(-np.inf, np.inf, (2,)),
+        lambda a: int(a[1] > 0),
+        "Bound them and take some",
+    ),
 }
 ASKED = {
     "tabulate": lambda env: tabulate(env, gamma=GAMMA),
@@ -71,8 +76,9 @@ ASKED = {
 @pytest.mark.parametrize("asked", ASKED)
 @pytest.mark.filterwarnings("ignore:.*MultiDiscrete")
 def test_actions_that_are_no_single_number_are_made_one(name, asked):
-    env = Does(*ACTIONS[name])
-    with pytest.raises((NotDiscrete, InvalidParameter), match="expected Discrete") as caught:
+    *does, says = ACTIONS[name]
+    env = Does(*does)
+    with pytest.raises((NotDiscrete, InvalidParameter), match=f"expected Discrete.*{says}") as caught:
         ASKED[asked](env)
     assert ASKED[asked](done(mends(str(caught.value))[0], env))
 

@@ -40,6 +40,8 @@ def _obey(case: Case) -> Mend:
             f"as {10 * slack:g}, or more episodes there.",
             (f"--slack {10 * slack:g}",),
         )
+    if case.linear and case.claims.get("margin_cap") is None:
+        return 'margin_cap="auto"; if it stays, more or other features, a larger S_0, or FiniteLP.', ("--margin-cap auto",)
     if case.linear:
         return "More or other features; a larger S_0; or FiniteLP, where the table is small enough.", ("--features",)
     found = case.best

@@ -119,6 +119,7 @@ def from_episodes(env):
     return TrajectoryLP(features, trajectories=5, horizon=5, max_rounds=1).fit(world, collect(env, Always(), 2, seed=0))
 
 
+ELSEWHERE = "Show what is hidden ("  # test_table.py: test_nothing_is_hidden_in_the_revealed_fickle_taxi
 SET_STATE = "give the environment get_state() and set_state(state)."
 CASES = [
     # searches

@@ -19,7 +19,6 @@ from irl_gym.claims import ENVIRONMENT, FIRST, STAGES, check_format, shell_comma
 from irl_gym.curves import Curve, read_curve
 from irl_gym.diagnoses.spoken import with_names
 from irl_gym.errors import InvalidInput, RunIncomplete
-from irl_gym.evaluation import reward_told
 from irl_gym.films import Film, load_film
 from irl_gym.layouts import GridLayout
 from irl_gym.linear_reward import LinearReward, load_reward
@@ -32,6 +31,7 @@ from irl_gym.rewards import TabularReward
 from irl_gym.run_folder import START, read_json
 from irl_gym.run_reader import RunReader
 from irl_gym.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
+from irl_gym.scorecard import reward_told
 from irl_gym.scores import RETRAINED, others
 from irl_gym.table_files import TABLE, load_table
 from irl_gym.tabulation import Tabulation

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from irl_gym.page.sections import Section
-from irl_gym.page.written import sentence_of
+from irl_gym.written import sentence_of
 
 LEARNING = ("learning", "Learning curve")
 EPISODES = ("episodes", "Episodes")

@@ -11,7 +11,6 @@ from irl_gym.bases import RadialBasis
 from irl_gym.certificates import certificate_of
 from irl_gym.curves import Curve
 from irl_gym.dynamic_programming import policy_iteration
-from irl_gym.evaluation import reward_told
 from irl_gym.experiment import Experiment
 from irl_gym.films import Film, Moment
 from irl_gym.layouts import grid_layout
@@ -24,6 +23,7 @@ from irl_gym.optimality import certify
 from irl_gym.page.contents import Contents
 from irl_gym.page.verdict import verdict
 from irl_gym.runs import Run
+from irl_gym.scorecard import reward_told
 from irl_gym.tabulate import tabulate
 
 SCRIPT = ["python", "scripts/recover_and_retrain.py"]

@@ -77,7 +77,7 @@ def test_questions_that_take_programs_are_not_asked_of_a_large_table(monkeypatch
 def test_a_reward_without_a_table_is_as_healthy_as_its_certificate():
     made = doctor(sampled(), None, None)
     table = sum(bool(set(needs) & {"expert", "reward", "true", "programs"}) for needs in CHECKS.values())
-    assert made.healthy and made.examined.startswith("Examined: what the learner certified.")
+    assert made.healthy and made.examined.startswith("Examined: what the learner proved.")
     assert f"{table}, as there is no table" in made.examined
 
 
@@ -130,7 +130,7 @@ def test_a_reward_from_elsewhere_is_judged_by_its_values(kind):
 
 
 def test_a_reward_from_elsewhere_needs_a_table():
-    with pytest.raises(InvalidParameter, match="result is a ndarray, a reward without a certificate, and mdp is None"):
+    with pytest.raises(InvalidParameter, match="result is a ndarray, a reward without a proof, and mdp is None"):
         doctor(np.zeros(25), None, None)
 
 

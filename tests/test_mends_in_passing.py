@@ -275,7 +275,7 @@ ELSEWHERE = ["Read the certificate's duality gap; if it is too large, choose the
 @pytest.mark.parametrize(("says", "mdp", "ill", "mended"), [(*one[:3], one[3:]) for one in STATUSES])
 def test_a_mend_that_a_status_names_serves(says, mdp, ill, mended):
     expert = GRID.expert if mdp is GRID.mdp else np.zeros(4, dtype=int)
-    assert says in ill.fit(mdp, expert).status.value
+    assert says in ill.fit(mdp, expert).status.sentence
     assert all(each.fit(mdp, expert).status is solvers.Status.OPTIMAL for each in mended)
 
 

@@ -1,5 +1,6 @@
 """A finding of the doctor may have several mends, one for each reason: each is said, executed, and serves."""
 
+from dataclasses import replace
 from functools import cache
 
 import gymnasium
@@ -40,7 +41,7 @@ def lake(learner, expert=LAKE_EXPERT, reward=None):
 
 
 def reward_of(found, learner):
-    return type(found)(learner.fit(LAKE.mdp, LAKE_EXPERT).reward, found.status, found.objective, found.certificate, found.stats)
+    return replace(found, reward=learner.fit(LAKE.mdp, LAKE_EXPERT).reward)
 
 
 def grid(learner, expert=GRID.expert, **known):

@@ -14,6 +14,7 @@ from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
 from irl_gym.facts import counted
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.metrics import normalised_score, policy_value, random_value, worst_tie
+from irl_gym.optimality import certify
 
 LAKE, TAXI = "FrozenLake 8x8 slippery", "Taxi"
 
@@ -86,9 +87,12 @@ def test_facts_tell_how_many_rows_are_violated_and_where_nothing_is_known(demons
 
 
 def test_proof_of_data_is_json_without_nan(demonstrate):
-    result, _ = learned(demonstrate(TAXI, 1000, 0.1), slack=1.0)
-    told = json.loads(json.dumps(result.proof.to_json(), allow_nan=False))
-    assert np.shape(told["violated_rows"]) == (len(told["violations"]), 2) and told["slack"] == 1.0
+    found = demonstrate(TAXI, 1000, 0.1)
+    result, _ = learned(found, slack=1.0)
+    assert json.loads(json.dumps(result.proof.to_json(), allow_nan=False))["slack"] == 1.0
+    optimality = certify(found[0].mdp, most_frequent(found[2]), result.reward, errs=True)
+    told = json.loads(json.dumps(optimality.to_json(), allow_nan=False))
+    assert np.shape(told["violated_rows"]) == (len(told["violations"]), 2)
 
 
 def test_nan_where_no_step_is_taken_is_an_expert_that_is_known(toy_text):

@@ -14,6 +14,7 @@ from irl_gym.errors import DegenerateExpert, InvalidParameter, InvalidPolicy
 from irl_gym.facts import counted
 from irl_gym.learners.finite import FiniteLP
 from irl_gym.metrics import normalised_score, policy_value, random_value, worst_tie
+from irl_gym.optimality import certify
 
 LAKE, TAXI = "FrozenLake 8x8 slippery", "Taxi"
 
@@ -85,9 +86,11 @@ def test_facts_tell_how_many_rows_are_violated_and_where_nothing_is_known(demons
     assert f"in {found.unknown.size} states that can be reached nothing is known of it" in found.told
 
 
-def test_proof_of_data_is_json_without_nan(demonstrate):
-    result, _ = learned(demonstrate(TAXI, 1000, 0.1), slack=1.0)
-    told = json.loads(json.dumps(result.proof.to_json(), allow_nan=False))
+def test_what_is_kept_of_data_is_json_without_nan(demonstrate):
+    table, best, seen = demonstrate(TAXI, 1000, 0.1)
+    result, _ = learned((table, best, seen), slack=1.0)
+    found = certify(table.mdp, most_frequent(seen), result.reward, errs=True)
+    told = json.loads(json.dumps(result.proof.to_json() | found.to_json(), allow_nan=False))
     assert np.shape(told["violated_rows"]) == (len(told["violations"]), 2) and told["slack"] == 1.0
 
 

@@ -38,7 +38,7 @@ class Proof(TypedDict, total=False):
     zero: bool
     expressible: bool
     fell_short: bool
-    objective: Number
+    objective: Number | None
     duality_gap: Number | None
     l1: Number
     slack: Number | None

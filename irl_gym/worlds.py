@@ -140,7 +140,8 @@ class SteppedWorld:
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a policy, deterministic but for the random one and for noise, which is drawn anew from the seed."""
-        return run_episodes(self.env, _anew(policy, seed), n, seed=seed, most=step_limit(self.env))
+        acting = self.random if isinstance(policy, RandomPolicy) else _anew(policy, seed)
+        return run_episodes(self.env, acting, n, seed=seed, most=step_limit(self.env))
 
     def value(self, policy: Any) -> float:
         """Mean discounted return of `eval_episodes` episodes."""

@@ -4,9 +4,12 @@ Terminal, page and comparison print facts, and do not ask who tells them. A fact
 have written: `facts_of` reads it.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
+
+import numpy as np
 
 from irl_gym.errors import DamagedFile
 
@@ -69,3 +72,15 @@ def aligned(facts: Iterable[Fact]) -> str:
 def counted(n: int, noun: str = "state", plural: str | None = None) -> str:
     """A count with its noun: 1 state, 3 states."""
     return f"{n:,} {noun if n == 1 else plural or noun + 's'}"
+
+
+def plain(record: Any, *properties: str) -> dict[str, Any]:
+    """The fields of a record, and some of its properties, as json holds them: NaN and infinity become None."""
+    found: dict[str, Any] = {}
+    for name in (*record.__dataclass_fields__, *properties):
+        value = getattr(record, name)
+        if isinstance(value, np.ndarray):
+            found[name] = [None if v != v else v for v in value.tolist()]
+        else:
+            found[name] = None if isinstance(value, float) and not math.isfinite(value) else value
+    return found

@@ -20,12 +20,11 @@ from irl_gym.checks import any_array
 from irl_gym.comparisons import Comparisons, as_compared, compare
 from irl_gym.dynamic_programming import optimum
 from irl_gym.errors import InvalidParameter
-from irl_gym.facts import Fact, aligned, counted
+from irl_gym.facts import Fact, aligned, counted, plain
 from irl_gym.loss import AT_STAKE, loss_on, told_loss
 from irl_gym.margins import Margins, best_margins, comparable, least_per_state, margins_of
 from irl_gym.mdp import TabularMDP
 from irl_gym.policies import as_distribution, completed
-from irl_gym.proven import plain
 from irl_gym.rewards import TabularReward, as_reward
 from irl_gym.sampling_error import counted_table
 

@@ -1,12 +1,9 @@
-"""What every learner's proof says of its program's optimum, and how json holds such records."""
+"""What every learner's proof says of its program's optimum."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
-from irl_gym.facts import Fact, aligned
+from irl_gym.facts import Fact, aligned, plain
 
 ROUNDING = 1e-7
 """A gap below this share of the objective is none."""
@@ -51,15 +48,3 @@ def cap_told(cap: float | None) -> Fact:
     """The cap on margins; a program without one may leave ties."""
     without = "none: Ng & Russell's own program, which may leave ties that a cap breaks (margin_cap='auto', --margin-cap auto)"
     return Fact("margin cap", without if cap is None else f"{cap:.4g}")
-
-
-def plain(record: Any, *properties: str) -> dict[str, Any]:
-    """The fields of a record, and some of its properties, as json holds them: NaN and infinity become None."""
-    found: dict[str, Any] = {}
-    for name in (*record.__dataclass_fields__, *properties):
-        value = getattr(record, name)
-        if isinstance(value, np.ndarray):
-            found[name] = [None if v != v else v for v in value.tolist()]
-        else:
-            found[name] = None if isinstance(value, float) and not math.isfinite(value) else value
-    return found

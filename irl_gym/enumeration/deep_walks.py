@@ -11,15 +11,13 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from irl_gym.copies.snapshots import ConstantChanged
+from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.outside import OutsideRandomness
-
-if TYPE_CHECKING:
-    from irl_gym.enumeration.explorer import Explorer
 
 STEPS = 2_000
 """Of all walks together."""
@@ -48,7 +46,7 @@ class Step:
     """The inner state in which it was made, where that was asked for."""
 
 
-def walk_on(explorer: "Explorer", seconds: float) -> None:
+def walk_on(explorer: Explorer, seconds: float) -> None:
     """Compare random walks with what an explorer has found.
 
     Args:
@@ -87,7 +85,7 @@ def walk_on(explorer: "Explorer", seconds: float) -> None:
             return
 
 
-def _steps(explorer: "Explorer", seed: list[int], keep: int | None) -> Iterator[Step]:
+def _steps(explorer: Explorer, seed: list[int], keep: int | None) -> Iterator[Step]:
     """A walk from a reset to its end, or to an observation that the table does not begin with."""
     explored, trials = explorer.explored, explorer.trials
     rng = np.random.default_rng(seed)
@@ -113,7 +111,7 @@ def _is(line: tuple[int, int, float, float], action: int, successor: int | None,
     return line[0] == action and line[1] == successor and math.isclose(line[3], reward, rel_tol=1e-6, abs_tol=1e-9)
 
 
-def _prove(explorer: "Explorer", seed: list[int], contradiction: Step) -> None:
+def _prove(explorer: Explorer, seed: list[int], contradiction: Step) -> None:
     """Raise what explains the contradiction."""
     trials, at = explorer.trials, len(contradiction.way)
     changed = trials.snapshots.changed_constants()

@@ -13,11 +13,9 @@ from typing import Any
 
 import gymnasium as gym
 
-from irl_gym.enumeration.deep_walks import walk_on
 from irl_gym.enumeration.explored import Explored, too_large
 from irl_gym.enumeration.hidden_part import hidden_part
 from irl_gym.enumeration.hidden_state import Behaviour, behaviour_of_lines, proof, unlike
-from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.replays import Replays
 from irl_gym.enumeration.trials import Call, Outcomes, Trials
@@ -64,14 +62,8 @@ class Explorer:
         self._held = 0
         self.explored = explored or Explored(self.n_actions)
         self.replays = Replays(self.explored, self.trials, self.space, self.key)
-        self._continued = explored is not None
+        self.continued = explored is not None
         self._on_states, self._began = on_states, time.monotonic()
-        if explored is None:
-            self.trials.pulse = self._pulse
-            self._begin()
-        else:
-            self._continue()
-            self._began, self.trials.pulse = time.monotonic(), self._pulse
 
     def expand(self) -> Iterator[None]:
         """Expand one state after the other, until none waits or a limit is reached.
@@ -93,17 +85,26 @@ class Explorer:
             self._doubts.extend(self._newcomers.pop(number, ()))
             while self._doubts:
                 self._compare(*self._doubts.popleft())
-            self._check_limits(time.monotonic() - self._began)
+            self._check_limits(self.seconds)
             yield
-        more = self._continued or any(times >= self.limits.revisits for times in self._revisits.values())
-        more = more or explored.starts_counted
-        if more and self.limits.revisits and not self.trials.counting:
-            walk_on(self, time.monotonic() - self._began)
+
+    @property
+    def open(self) -> bool:
+        """May the states in which an observation was tried again be too few to tell that it hides nothing?"""
+        more = self.continued or any(times >= self.limits.revisits for times in self._revisits.values())
+        return (more or self.explored.starts_counted) and bool(self.limits.revisits) and not self.trials.counting
+
+    @property
+    def seconds(self) -> float:
+        """Since the search began."""
+        return time.monotonic() - self._began
 
     def _steps(self, state: Any) -> list[Call]:
         return [self.trials.step(state, action) for action in range(self.n_actions)]
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Find the states in which episodes begin; before `expand`, of a search that is new."""
+        self.trials.pulse = self._pulse
         seen = self.trials.outcomes(self.trials.reset(), -1, self._keep, runs=self.limits.start_runs)
         self._count(seen)
         different = len({one.made[0] for one in seen.all})
@@ -269,18 +270,18 @@ class Explorer:
 
     def _pulse(self) -> None:
         """Within a call that takes long: tell, and look at the clock."""
-        explored, limits, seconds = self.explored, self.limits, time.monotonic() - self._began
+        explored, limits, seconds = self.explored, self.limits, self.seconds
         self._on_states(explored.n_expanded, len(explored.keys))
         if limits.max_seconds is not None and seconds > limits.max_seconds:
             raise too_large(explored, seconds, explored.size + self._held, f"max_seconds={limits.max_seconds:g}")
 
-    def _continue(self) -> None:
-        """Go on with an earlier search, from the inner states that its paths lead to."""
-        check_kept(self)
+    def resume(self) -> None:
+        """Go on with an earlier search, from the inner states that its paths lead to; before `expand`, once it was checked."""
         states = self.replays.waiting()
         self._waiting = {number: state for number, state in states.items() if number >= self.explored.n_expanded}
         self._marks = {number: (_mark(state),) for number, state in states.items()}
         self._held = sum(map(_size, self._waiting.values()))
+        self._began, self.trials.pulse = time.monotonic(), self._pulse
 
 
 def _mark(state: Any) -> int:

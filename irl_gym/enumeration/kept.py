@@ -1,19 +1,17 @@
 """Does an environment still do what an earlier search found? Asked of its starts and of some states, before it is continued."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from irl_gym.enumeration.explorer import Explorer
 from irl_gym.enumeration.hidden_state import SAME, Behaviour, behaviour_of_lines, shown, unlike
 from irl_gym.enumeration.replays import another
 from irl_gym.enumeration.trials import MOST_REFUSALS
-
-if TYPE_CHECKING:
-    from irl_gym.enumeration.explorer import Explorer
 
 CHECKED = 20
 """States of an earlier search that are tried again before it is continued."""
 
 
-def check_kept(explorer: "Explorer") -> None:
+def check_kept(explorer: Explorer) -> None:
     """Does the environment still do what is kept, at a reset and in some states? Nothing is changed by asking.
 
     Raises:
@@ -37,7 +35,7 @@ def check_kept(explorer: "Explorer") -> None:
     trials.refusals = explored.counted["refusals"]
 
 
-def _kept(explorer: "Explorer", number: int, state: Any, kept: Behaviour, refusals: int) -> bool:
+def _kept(explorer: Explorer, number: int, state: Any, kept: Behaviour, refusals: int) -> bool:
     explorer.trials.refusals = refusals
     again = explorer.behaviour(state, [], number)
     return again is not None and unlike(kept, again) is None

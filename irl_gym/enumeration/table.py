@@ -23,8 +23,10 @@ from irl_gym.copies.calls import called, seeded_globals
 from irl_gym.copies.snapshots import ConstantChanged
 from irl_gym.copies.stripped import without_watchers
 from irl_gym.copies.time_limits import check_limits, check_times, limited
+from irl_gym.enumeration.deep_walks import walk_on
 from irl_gym.enumeration.explored import Explored, load_explored
 from irl_gym.enumeration.explorer import Explorer
+from irl_gym.enumeration.kept import check_kept
 from irl_gym.enumeration.limits import Limits
 from irl_gym.enumeration.outside import OutsideRandomness
 from irl_gym.errors import EnumerationLimit, InvalidParameter, UnknownObservation
@@ -104,6 +106,11 @@ class Enumeration(Limits):
                 own = without_watchers(env)
                 called(lambda own=own: own.reset(seed=self.seed))
                 explorer = Explorer(own, self, explored, always, bool(outside), modules, on_states)
+                if explorer.continued:
+                    check_kept(explorer)
+                    explorer.resume()
+                else:
+                    explorer.begin()
                 explorer.explored.outside, explorer.explored.modules = outside, modules
                 explorer.explored.always = tuple(sorted(always))
                 explorer.explored.settle()
@@ -138,6 +145,8 @@ class Enumeration(Limits):
                     _guard(explorer)
                     self._save(explorer, env)
                     written = time.monotonic()
+            if explorer.open:
+                walk_on(explorer, explorer.seconds)
         except KeyboardInterrupt:
             if not explorer.trials.snapshots.changed_constants():
                 self._save(explorer, env)

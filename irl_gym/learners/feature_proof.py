@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Indices
-from irl_gym.facts import Fact, counted
-from irl_gym.proven import Proven, cap_told, plain
+from irl_gym.facts import Fact, counted, plain
+from irl_gym.proven import Proven, cap_told
 
 
 @dataclass(frozen=True, eq=False)

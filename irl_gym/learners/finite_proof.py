@@ -16,11 +16,11 @@ from irl_gym._typing import ActionSets, Indices
 from irl_gym.comparisons import Comparisons
 from irl_gym.discounted import Discounted
 from irl_gym.dual_bound import DualBound
-from irl_gym.facts import Fact, counted
+from irl_gym.facts import Fact, counted, plain
 from irl_gym.margins import least_per_state, row_margins
 from irl_gym.mdp import TabularMDP
 from irl_gym.optimality import certify
-from irl_gym.proven import Proven, cap_told, plain
+from irl_gym.proven import Proven, cap_told
 from irl_gym.rewards import TabularReward
 
 ROUNDING = 1e-12

@@ -10,7 +10,7 @@ as low as these margins allow. Axes: S states, A actions, n rows of (4).
 """
 
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from irl_gym.comparisons import compare
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverInfeasible
 from irl_gym.learners.base import IRLResult
 from irl_gym.learners.finite_proof import FiniteProof
-from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN
+from irl_gym.learners.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, RewardOn
 from irl_gym.learners.soft import Found, PartlyKnown, SoftProgram
 from irl_gym.learners.soft_proof import Terms, prove_partly
 from irl_gym.learners.strict_rows import strict_rows
@@ -27,9 +27,6 @@ from irl_gym.mdp import TabularMDP
 from irl_gym.rewards import TabularReward
 from irl_gym.solvers import Solving, Status
 
-if TYPE_CHECKING:
-    from irl_gym.learners.finite import FiniteLP
-
 GIVEN_UP_BELOW = 1e3
 """Margins down to R_max over this count when the rows are chosen that are given up."""
 GIVEN_UP = 1e-6
@@ -37,6 +34,46 @@ GIVEN_UP = 1e-6
 LEEWAYS = (1e-8, 1e-7, 1e-6)
 """What the simplest reward may leave of the best one's margins, in their unit: without it no interior is left. The next where
 the solver finds none. The proof's gap includes it."""
+
+
+@runtime_checkable
+class Asked(Protocol):
+    """What is read of a FiniteLP, whose fields these are."""
+
+    @property
+    def r_max(self) -> float:
+        """R_max, the bound on |R|."""
+        ...
+
+    @property
+    def l1(self) -> float | Literal["auto"]:
+        """lambda, the price of ||R||_1."""
+        ...
+
+    @property
+    def margin_cap(self) -> float | Literal["auto"] | None:
+        """tau, the cap on margins."""
+        ...
+
+    @property
+    def reward_on(self) -> RewardOn:
+        """What R is a function of."""
+        ...
+
+    @property
+    def report_lambda_0(self) -> bool:
+        """Is lambda_0 wanted whatever l1 is?"""
+        ...
+
+    @property
+    def slack(self) -> float | None:
+        """C, the price of a violation."""
+        ...
+
+    @property
+    def unvisited(self) -> Literal["avoid", "free"]:
+        """Which reward unknown states have."""
+        ...
 
 
 class PartialTask:
@@ -55,7 +92,7 @@ class PartialTask:
     """
 
     def __init__(
-        self, learner: "FiniteLP", mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None,
+        self, learner: Asked, mdp: TabularMDP, distribution: Any, known: np.ndarray, visits: np.ndarray | None,
         solving: Solving,
     ):  # fmt: skip
         self.learner, self.mdp, self.solving = learner, mdp, solving

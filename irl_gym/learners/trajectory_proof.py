@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.facts import Fact
+from irl_gym.facts import Fact, plain
 from irl_gym.learners.feature_proof import features_told
-from irl_gym.proven import Proven, plain
+from irl_gym.proven import Proven
 
 TIED = "R ties the expert with every policy found, to two standard errors"
 UNKNOWN = "one episode tells no noise"

@@ -16,8 +16,8 @@
     collect, write_minari, read_minari        demonstrations
     recover_and_retrain(Experiment(...), out) all of it in one call
 
-Each name's own module says more: `help(irl_gym.learners.finite)` for the linear programs. Errors derive from IrlGymError.
-The names below are imported when first used; `import irl_gym` itself loads no torch, cvxpy, minari or matplotlib.
+Each name's own module says more: `help(irl_gym.learners.linear_programs.finite)` for the linear programs. Errors derive from
+IrlGymError. The names below are imported when first used; `import irl_gym` itself loads no torch, cvxpy, minari or matplotlib.
 """
 
 import lazy_loader

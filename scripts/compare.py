@@ -13,13 +13,13 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
+from irl_gym.commands.terminal import check_writable, exit_code, print_error
 from irl_gym.errors import InvalidParameter
 from irl_gym.facts import harmless
-from irl_gym.page.comparison import lettered, write_comparison
-from irl_gym.page.pooled import told
-from irl_gym.pooling import pools
-from irl_gym.runs import read_run
-from irl_gym.terminal import check_writable, exit_code, print_error
+from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
+from irl_gym.reports.comparison.pooled import told
+from irl_gym.runs.pooling import pools
+from irl_gym.runs.run import read_run
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,14 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
-from irl_gym.diagnoses.findings import told_answer
-from irl_gym.diagnoses.spoken import usable_flags, with_names
-from irl_gym.diagnosis import Diagnosis, diagnose_run, diagnose_unfinished
+from irl_gym.commands.terminal import exit_code, print_error
 from irl_gym.errors import RunIncomplete
 from irl_gym.facts import harmless
-from irl_gym.runs import Run, read_run
-from irl_gym.terminal import exit_code, print_error
+from irl_gym.judging.diagnoses.doctor import Diagnosis
+from irl_gym.judging.diagnoses.findings import told_answer
+from irl_gym.judging.diagnoses.plain_words import usable_flags, with_names
+from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
+from irl_gym.runs.run import Run, read_run
 
 CODES = {"healthy": 0, "findings": 1, "not examined": 3}
 """What the script exits with, by the doctor's answer."""

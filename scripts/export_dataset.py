@@ -17,14 +17,14 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
-from irl_gym.arguments import parse_reveal
-from irl_gym.choices import environment_of
-from irl_gym.datasets import described
-from irl_gym.demonstrators import Recording
-from irl_gym.experiment import parse_keywords
-from irl_gym.export import Amount, export_dataset
-from irl_gym.minari_files import unkept
-from irl_gym.terminal import OPTIONS, UNSET, exit_code, print_error, stage_bars
+from irl_gym.commands.arguments import parse_reveal
+from irl_gym.commands.demonstrators import Recording
+from irl_gym.commands.terminal import OPTIONS, UNSET, exit_code, print_error, stage_bars
+from irl_gym.demonstrations.datasets import described
+from irl_gym.demonstrations.export import Amount, export_dataset
+from irl_gym.demonstrations.minari_files import unkept
+from irl_gym.runs.experiment import parse_keywords
+from irl_gym.runs.named_parts import environment_of
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Measure how long the instruments of `irl_gym.ambiguity` take, and what they find in Ng & Russell's first experiment.
+"""Measure how long the instruments of `irl_gym.judging.ambiguity` take, and what they find in Ng & Russell's first experiment.
 
 For example:
     python scripts/measure_ambiguity.py
@@ -13,13 +13,13 @@ import numpy as np
 import tyro
 
 from irl_gym import FiniteLP, policy_iteration, tabulate, value_iteration
-from irl_gym.ambiguity.feasible import membership, sample_feasible
-from irl_gym.ambiguity.lambda_path import lambda_path
-from irl_gym.ambiguity.uniqueness import optimal_face
-from irl_gym.ambiguity.widths import feasible_widths
-from irl_gym.mdp import TabularMDP
-from irl_gym.ng_russell_2000.experiment_1 import Experiment1
-from irl_gym.terminal import print_table
+from irl_gym.commands.ng_russell_2000.experiment_1 import Experiment1
+from irl_gym.commands.terminal import print_table
+from irl_gym.judging.ambiguity.feasible import membership, sample_feasible
+from irl_gym.judging.ambiguity.lambda_path import lambda_path
+from irl_gym.judging.ambiguity.uniqueness import optimal_face
+from irl_gym.judging.ambiguity.widths import feasible_widths
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 Row = tuple[str, ...]
 ASKED: dict[str, dict[str, Any]] = {"default": {}, "(4) alone": {"margin": None}, "steps": {"reward_on": "state-action"}}

@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.table import Table
 
 from irl_gym import Experiment, FiniteLP, IrlGymError, policy_iteration, recover_and_retrain, tabulate, write_minari
-from irl_gym.demonstrators import Recording
-from irl_gym.metrics import normalised_score, policy_value, random_value
-from irl_gym.noise import noisy
-from irl_gym.policies import load_actions
+from irl_gym.agents.noise import noisy
+from irl_gym.commands.demonstrators import Recording
+from irl_gym.judging.metrics import normalised_score, policy_value, random_value
+from irl_gym.mdp.policies import load_actions
 
 GAMMA, GRID, CLASSIC = 0.99, "irl_gym_envs:irl_gym/MiniGrid-v0", "irl_gym_envs.gym_classics:"
 RULES: dict[str, dict] = {"sab": {}, "natural": {"sab": False, "natural": True}}  # Blackjack-v1 is registered with sab

@@ -19,9 +19,9 @@ from rich.console import Console
 from rich.table import Table
 
 from irl_gym import policy_iteration, tabulate
-from irl_gym.enumeration.table import Enumeration
-from irl_gym.metrics import policy_value
-from irl_gym.reveal import Reveal, known_hidden
+from irl_gym.environments.reveal import Reveal, known_hidden
+from irl_gym.judging.metrics import policy_value
+from irl_gym.tables.enumeration.table import Enumeration
 
 RULES: dict[str, dict] = {"default": {"sab": False}, "natural": {"natural": True, "sab": False}, "sab": {"sab": True}}
 LAKES = product(("4x4", "8x8"), (True, False))

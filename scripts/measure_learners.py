@@ -14,15 +14,15 @@ import numpy as np
 import tyro
 
 from irl_gym import FeatureLP, Simulator, TrajectoryLP, ValueIteration, policy_iteration, tabulate, value_iteration, worst_tie
-from irl_gym.bases import Fourier, Polynomial, RadialBasis
-from irl_gym.demonstrations import collect_from_table
-from irl_gym.features import FeatureMap, OneHot, Unravel
-from irl_gym.metrics import normalised_score, policy_value, random_value
-from irl_gym.optimality import certify
-from irl_gym.planners import tabular_actions
-from irl_gym.policies import Policy
-from irl_gym.table_world import step_limit
-from irl_gym.terminal import print_table
+from irl_gym.agents.planners import tabular_actions
+from irl_gym.commands.terminal import print_table
+from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.features.feature_maps import FeatureMap, OneHot, Unravel
+from irl_gym.judging.metrics import normalised_score, policy_value, random_value
+from irl_gym.loop.table_world import step_limit
+from irl_gym.mdp.episodes import collect_from_table
+from irl_gym.mdp.optimality import certify
+from irl_gym.mdp.policies import Policy
 
 GAMMA = 0.99
 ENVIRONMENTS: dict[str, tuple[str, dict, tuple[int, ...]]] = {

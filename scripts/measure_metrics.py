@@ -17,8 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 from irl_gym import TabularReward, policy_iteration, tabulate
-from irl_gym.distances import MinimalNorm, dard, epic, spearman, starc
-from irl_gym.metrics import (
+from irl_gym.judging.distances import MinimalNorm, dard, epic, spearman, starc
+from irl_gym.judging.metrics import (
     agreement,
     best_tie,
     expected_value_difference,

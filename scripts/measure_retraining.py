@@ -18,10 +18,10 @@ from rich.console import Console
 from rich.table import Table
 
 from irl_gym import SB3, FiniteLP, TabularVecEnv, policy_iteration, tabulate, worst_tie
-from irl_gym.metrics import normalised_score, policy_value, random_value
-from irl_gym.planners import FOR_ADVANTAGES, tabular_actions
-from irl_gym.scorecard import settled_at
-from irl_gym.shaping import ExpectedAdvantage
+from irl_gym.agents.planners import FOR_ADVANTAGES, tabular_actions
+from irl_gym.judging.metrics import normalised_score, policy_value, random_value
+from irl_gym.mdp.shaping import ExpectedAdvantage
+from irl_gym.runs.scorecard import settled_at
 
 ENVIRONMENTS = {
     "FrozenLake 4x4 slippery": ("FrozenLake-v1", {"map_name": "4x4"}),

@@ -28,10 +28,10 @@ from irl_gym import (
     tabulate,
     value_iteration,
 )
-from irl_gym.claims import STAGES
-from irl_gym.own_files import check_links
-from irl_gym.run_folder import START, changed, read_record
-from irl_gym.terminal import print_table
+from irl_gym.commands.terminal import print_table
+from irl_gym.files.own_files import check_links
+from irl_gym.files.run_folder import START, changed, read_record
+from irl_gym.runs.identity import STAGES
 
 GRID = "irl_gym_envs:irl_gym/GridWorld-v0"
 MEGABYTE = 1024  # of ru_maxrss, which counts kilobytes on Linux

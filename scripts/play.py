@@ -20,12 +20,12 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on sta
 import tyro
 
 from irl_gym import IrlGymError
-from irl_gym.experiment import parse_keywords
-from irl_gym.keyboard import controls_of
-from irl_gym.minari_files import unkept
-from irl_gym.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
-from irl_gym.screens import as_text, draw, terminal_keys, window_keys
-from irl_gym.terminal import OPTIONS, UNSET, exit_code, print_error
+from irl_gym.commands.keyboard import controls_of
+from irl_gym.commands.playing import Mode, Play, Turn, free_dataset, learn_command, stage, write_played
+from irl_gym.commands.screens import as_text, draw, terminal_keys, window_keys
+from irl_gym.commands.terminal import OPTIONS, UNSET, exit_code, print_error
+from irl_gym.demonstrations.minari_files import unkept
+from irl_gym.runs.experiment import parse_keywords
 
 ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 """Ctrl-C, a kill, a terminal that is closed: nothing that was finished is lost."""

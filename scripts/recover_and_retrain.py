@@ -14,10 +14,10 @@ import tyro
 from rich.console import Console
 
 from irl_gym import IrlGymError, recover_and_retrain
-from irl_gym.arguments import Arguments
-from irl_gym.claims import PROGRAM
-from irl_gym.report import print_report
-from irl_gym.terminal import OPTIONS, exit_code, print_error, stage_bars
+from irl_gym.commands.arguments import Arguments
+from irl_gym.commands.terminal import OPTIONS, exit_code, print_error, stage_bars
+from irl_gym.reports.terminal_report import print_report
+from irl_gym.runs.identity import PROGRAM
 
 
 def main(arguments: Arguments, command: Sequence[str]) -> int:

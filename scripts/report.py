@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.text import Text
 
 from irl_gym import IrlGymError
-from irl_gym.page.report import write_report
-from irl_gym.runs import read_run
-from irl_gym.terminal import OPTIONS, UNSET, check_writable, exit_code, print_error
+from irl_gym.commands.terminal import OPTIONS, UNSET, check_writable, exit_code, print_error
+from irl_gym.reports.page.report import write_report
+from irl_gym.runs.run import read_run
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from irl_gym import IrlGymError
+from irl_gym.commands.ng_russell_2000 import figures
+from irl_gym.commands.ng_russell_2000.experiment_1 import Experiment1
+from irl_gym.commands.ng_russell_2000.experiment_2 import Experiment2
+from irl_gym.commands.ng_russell_2000.experiment_3 import Experiment3
+from irl_gym.commands.ng_russell_2000.records import Check
 from irl_gym.errors import InvalidParameter
-from irl_gym.ng_russell_2000 import figures
-from irl_gym.ng_russell_2000.experiment_1 import Experiment1
-from irl_gym.ng_russell_2000.experiment_2 import Experiment2
-from irl_gym.ng_russell_2000.experiment_3 import Experiment3
-from irl_gym.ng_russell_2000.records import Check
-from irl_gym.run_folder import write_json
+from irl_gym.files.run_folder import write_json
 
 EXPERIMENTS: dict[int, tuple[Any, str]] = {
     1: (Experiment1, "the 5 x 5 grid, section 3 (figures 1 and 2)"),

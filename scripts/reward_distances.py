@@ -17,14 +17,14 @@ from rich.console import Console
 from rich.progress import track
 from scipy.stats import rankdata
 
-from irl_gym import distances as known
 from irl_gym.checks import checked_number
-from irl_gym.distances.bounds import epic_bound
-from irl_gym.distances.gridworlds import PRINTED, gridworld, gridworld_rewards, other_than_printed
-from irl_gym.distances.random_rewards import random_mdp, random_reward, redistributed, relative_regret, shaped
-from irl_gym.distances.variants import LEVELLED, VARIANTS
+from irl_gym.commands.terminal import print_table
 from irl_gym.errors import InvalidParameter
-from irl_gym.terminal import print_table
+from irl_gym.judging import distances as known
+from irl_gym.judging.distances.bounds import epic_bound
+from irl_gym.judging.distances.gridworlds import PRINTED, gridworld, gridworld_rewards, other_than_printed
+from irl_gym.judging.distances.random_rewards import random_mdp, random_reward, redistributed, relative_regret, shaped
+from irl_gym.judging.distances.variants import LEVELLED, VARIANTS
 
 Measured = Literal["figure", "invariance", "regret", "bound"]
 CONSOLE = Console(width=120)

@@ -2,8 +2,8 @@
 
 from types import SimpleNamespace
 
-from irl_gym.linear_reward import LinearReward
-from irl_gym.optimality import certify
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.mdp.optimality import certify
 
 
 def both(result, mdp, expert, states=None):

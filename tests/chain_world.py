@@ -4,13 +4,13 @@ import models
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.demonstrations import Episode
-from irl_gym.dynamic_programming import occupancy, value_iteration
-from irl_gym.feature_sums import discounted_sums
-from irl_gym.policies import TabularPolicy, as_distribution
-from irl_gym.rewards import TabularReward
-from irl_gym.sampling import Successors
-from irl_gym.states import StateIndex
+from irl_gym.features.feature_sums import discounted_sums
+from irl_gym.mdp.episodes import Episode
+from irl_gym.mdp.planning.dynamic_programming import occupancy, value_iteration
+from irl_gym.mdp.policies import TabularPolicy, as_distribution
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.sampling import Successors
+from irl_gym.spaces.states import StateIndex
 
 GAMMA = 0.9
 

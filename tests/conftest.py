@@ -49,7 +49,7 @@ KWARGS = {
 @pytest.fixture(scope="session")
 def toy_text():
     """Tables of Gymnasium's environments and ours with gamma 0.99, by the names of references.md; each made once, unchecked."""
-    from irl_gym.tabulate import tabulate  # here, so that the filter of pytest_configure is in force
+    from irl_gym.tables.tabulate import tabulate  # here, so that the filter of pytest_configure is in force
 
     made = {}
 
@@ -75,7 +75,7 @@ def finished(tmp_path_factory):
     """The folder of the finished run of `lake_run`, which is copied before it is changed."""
     from lake_run import COMMAND, asked
 
-    from irl_gym.pipeline import recover_and_retrain
+    from irl_gym.loop.pipeline import recover_and_retrain
 
     out = tmp_path_factory.mktemp("runs") / "lake"
     recover_and_retrain(asked(), out, command=COMMAND)

@@ -3,8 +3,8 @@
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.counting import Counting
-from irl_gym.demonstrations import Episode
+from irl_gym.mdp.episodes import Episode
+from irl_gym.tables.counted.counting import Counting
 
 
 def episode(observations, actions, rewards=None, *, terminated=True):

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 ONE, NOTHING = Fraction(1), Fraction(0)
 

@@ -2,7 +2,7 @@
 
 import json
 
-from irl_gym.own_files import digest
+from irl_gym.files.own_files import digest
 
 
 def without_digests(run):

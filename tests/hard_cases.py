@@ -3,8 +3,8 @@
 import numpy as np
 from exact import ExactMDP
 
-from irl_gym.mdp import TabularMDP
-from irl_gym.rewards import TabularReward
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 GAMMAS = (0.9, 0.99, 0.9999, 0.999999)
 

@@ -5,8 +5,8 @@ import numpy as np
 from gymnasium import spaces
 from scipy.stats import poisson
 
-from irl_gym.mdp import TabularMDP
-from irl_gym.rewards import TabularReward
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 HOLDING, SHORTAGE, FIXED = 0.1, 2.0, 2.0
 

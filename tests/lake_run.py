@@ -1,7 +1,7 @@
 """The run that tests of what a run leaves share: a lake without slipping, and an agent trained for a moment."""
 
-from irl_gym.experiment import Experiment
-from irl_gym.planners import SB3
+from irl_gym.agents.planners import SB3
+from irl_gym.runs.experiment import Experiment
 
 COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}

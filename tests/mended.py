@@ -11,10 +11,10 @@ import pytest
 from gymnasium import spaces
 
 from irl_gym import errors
-from irl_gym.discretize import discretize
+from irl_gym.environments.reveal import Reveal
 from irl_gym.errors import HiddenState, UnknownObservation
-from irl_gym.reveal import Reveal
-from irl_gym.tabulate import tabulate
+from irl_gym.tables.discretize import discretize
+from irl_gym.tables.tabulate import tabulate
 
 GAMMA = 0.9
 
@@ -30,7 +30,7 @@ def named(*files, wide=False):
     Widely, also the last sentences of errors that do not say what was expected.
     """
     for file in files:
-        for node in ast.walk(ast.parse((Path(errors.__file__).parent / file).read_text())):
+        for node in ast.walk(ast.parse(_file(file).read_text())):
             if isinstance(node, ast.Call) and hasattr(errors, getattr(node.func, "id", "")) and node.args:
                 text = _text(node.args[0])
                 texts = [text.partition(": expected")[2].partition(". ")[2]]
@@ -46,6 +46,12 @@ def named(*files, wide=False):
                 for one in texts
                 if re.search("[a-z]", one) and not one.strip().endswith("?")
             )
+
+
+def _file(name):
+    """A file of the library, by the end of its path."""
+    (found,) = Path(errors.__file__).parent.rglob(str(name))
+    return found
 
 
 def _text(node):
@@ -88,9 +94,9 @@ def unsaid(cases, *files):
 
 def done(code, env):
     """What a mend makes."""
-    import irl_gym.counting
-    import irl_gym.reveal
-    import irl_gym.seeded_starts
+    import irl_gym.environments.reveal
+    import irl_gym.environments.seeded_starts
+    import irl_gym.tables.counted.counting
 
     return eval(
         code, {"env": env, "gamma": GAMMA, "discretize": discretize, "irl_gym": irl_gym, "gymnasium": gymnasium, "numpy": numpy}
@@ -111,7 +117,7 @@ def revealed(env):
             tabulate(Reveal(env, shown) if shown else env, gamma=GAMMA, check_steps=500)
             return Reveal(env, shown)
         except HiddenState as error:
-            code = next(one for one in mends(str(error)) if one.startswith("irl_gym.reveal.Reveal"))
+            code = next(one for one in mends(str(error)) if one.startswith("irl_gym.environments.reveal.Reveal"))
             shown |= done(code, env).shown
         except UnknownObservation as error:
             more = re.search(r"shown=(\{.*?\})", str(error))

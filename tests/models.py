@@ -7,7 +7,7 @@ import reference
 import scipy.sparse as sp
 from hypothesis import strategies as st
 
-from irl_gym.mdp import TabularMDP
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 KINDS = ("dense", "sparse", "terminal", "deterministic", "walls")
 

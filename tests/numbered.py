@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from irl_gym.demonstrations import Episode
+from irl_gym.mdp.episodes import Episode
 
 
 class Numbered:

@@ -3,18 +3,18 @@
 import numpy as np
 from models import ring
 
-from irl_gym.comparisons import compare
-from irl_gym.diagnosis import doctor
-from irl_gym.features import Table
+from irl_gym.features.feature_maps import Table
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.judging.diagnoses.doctor import doctor
 from irl_gym.learners.base import IRLResult
-from irl_gym.learners.finite_proof import prove
-from irl_gym.learners.trajectory_proof import TrajectoryProof
-from irl_gym.linear_reward import LinearReward
-from irl_gym.margins import comparable
-from irl_gym.mdp import TabularMDP
-from irl_gym.policies import completed
-from irl_gym.rewards import TabularReward
-from irl_gym.solvers import Status
+from irl_gym.learners.linear_programs.proofs.finite_proof import prove
+from irl_gym.learners.linear_programs.proofs.trajectory_proof import TrajectoryProof
+from irl_gym.mdp.margins import comparable
+from irl_gym.mdp.optimality_rows import compare
+from irl_gym.mdp.policies import completed
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs.solvers import Status
 
 
 def judged(mdp, expert, R, stats=None):

@@ -1,4 +1,5 @@
-"""The soft program of `irl_gym.learners.soft` as its page prints it, dense, by another solver; shares no code with irl_gym.
+"""The soft program of `irl_gym.learners.linear_programs.soft` as its page prints it, dense, by another solver; shares no code
+with irl_gym.
 
 Axes: S states, A actions; P is (S, A, S) and the rows of terminal states are zero; `expert` is (S, A), NaN where not known.
 """

@@ -39,9 +39,10 @@ runpy.run_path(script, run_name="__main__")
 
 
 def run_until(script, *arguments, where, nth=1, sent, cwd=None, **changes):
-    """A script's finished process, which was sent a signal in the n-th call of `where`, such as "irl_gym.shards:Shards.append".
+    """A script's finished process, which was sent a signal in the n-th call of `where`, such as
+    "irl_gym.demonstrations.shards:Shards.append".
 
-    `changes` are values of the child's modules: {"irl_gym.export:SHARD_BYTES": 1}.
+    `changes` are values of the child's modules: {"irl_gym.demonstrations.export:SHARD_BYTES": 1}.
     """
     command = [sys.executable, "-c", STOPPING, where, str(nth), str(int(sent)), json.dumps(changes), str(script), *arguments]
     path = os.pathsep.join([str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])

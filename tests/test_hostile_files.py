@@ -9,11 +9,9 @@ from fuzz.experts import write_experts
 from fuzz.readers import write_linear, write_path, write_search
 from gymnasium import spaces
 
-from irl_gym.ambiguity.lambda_path import LambdaPath
-from irl_gym.archives import read_arrays
-from irl_gym.bases import Fourier, Polynomial, RadialBasis
-from irl_gym.demonstrations import Episode
-from irl_gym.enumeration.explored import load_explored
+from irl_gym.agents.experts import load_expert
+from irl_gym.demonstrations.imports import from_arrays, from_rollouts
+from irl_gym.demonstrations.shards import Shards
 from irl_gym.errors import (
     InvalidDemonstrations,
     InvalidFeatures,
@@ -23,11 +21,13 @@ from irl_gym.errors import (
     RunConflict,
     UnknownObservation,
 )
-from irl_gym.experiment import parse_keywords
-from irl_gym.experts import load_expert
-from irl_gym.imports import from_arrays, from_rollouts
-from irl_gym.linear_reward import LinearReward
-from irl_gym.shards import Shards
+from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.files.archives import read_arrays
+from irl_gym.judging.ambiguity.lambda_path import LambdaPath
+from irl_gym.mdp.episodes import Episode
+from irl_gym.runs.experiment import parse_keywords
+from irl_gym.tables.enumeration.explored import load_explored
 
 INTO = {"space": spaces.Discrete(16), "n_actions": 4}
 

@@ -57,7 +57,7 @@ for line in sys.stdin:
 """
 RUN = ("recover_and_retrain.py", "--out", ("--env-kwargs", "is_slippery=false", "--episodes", "5", "--total-timesteps", "2048"))
 EXPORT = ("export_dataset.py", "--root", ("--env-id", "FrozenLake-v1", "--dataset-id", "lake/best-v0", "--episodes", "40"))
-OFTEN = {"irl_gym.export:SHARD_BYTES": 3_000}
+OFTEN = {"irl_gym.demonstrations.export:SHARD_BYTES": 3_000}
 TIMED = re.compile(r"(.*/)?(agent\.zip|tensorboard/.*|\.stages/.*)")
 """Files that hold the time."""
 

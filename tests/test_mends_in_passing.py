@@ -11,30 +11,30 @@ from gymnasium.wrappers import TransformAction
 from mended import GAMMA, told
 from models import paper_grid
 
-from irl_gym import solvers
-from irl_gym.bases import RadialBasis
-from irl_gym.choices import environment_of, features_named
-from irl_gym.counting import Interaction
-from irl_gym.datasets import load_minari, minari_root, write_minari
-from irl_gym.deadline import Deadline
-from irl_gym.demonstrations import collect
-from irl_gym.distances import Transitions
-from irl_gym.endings import in_table
-from irl_gym.enumeration.draws import Draws
-from irl_gym.enumeration.table import Enumeration
-from irl_gym.experts import Acting
-from irl_gym.features import OneHot
-from irl_gym.imports import from_arrays
-from irl_gym.learners.feature import FeatureLP
-from irl_gym.learners.finite import FiniteLP
-from irl_gym.linear_reward import LinearReward
-from irl_gym.mdp import TabularMDP
-from irl_gym.reveal import Reveal
-from irl_gym.rewards import TabularReward
-from irl_gym.solvers import Solving, solve
-from irl_gym.tabulate import tabulate
-from irl_gym.warm_lp import WarmLP
-from irl_gym.wrappers import LearnedReward
+from irl_gym.agents.experts import Acting
+from irl_gym.demonstrations.datasets import load_minari, minari_root, write_minari
+from irl_gym.demonstrations.endings import in_table
+from irl_gym.demonstrations.imports import from_arrays
+from irl_gym.environments.learned_reward import LearnedReward
+from irl_gym.environments.reveal import Reveal
+from irl_gym.features.bases import RadialBasis
+from irl_gym.features.feature_maps import OneHot
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.judging.distances import Transitions
+from irl_gym.learners.linear_programs.feature import FeatureLP
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.episodes import collect
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs import solvers
+from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.solvers import Solving, solve
+from irl_gym.programs.warm_lp import WarmLP
+from irl_gym.runs.named_parts import environment_of, features_named
+from irl_gym.tables.counted.counting import Interaction
+from irl_gym.tables.draws.exact_draws import Draws
+from irl_gym.tables.enumeration.table import Enumeration
+from irl_gym.tables.tabulate import tabulate
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 LAKE = gym.make("FrozenLake-v1", is_slippery=False)
@@ -206,7 +206,7 @@ def worded():
 WORDS = ["left", "right"]
 CASES = [
     # environments
-    ("show it with `irl_gym.reveal.Reveal`.", lambda _: tabulate(Published(), gamma=GAMMA, check_steps=300),
+    ("show it with `irl_gym.environments.reveal.Reveal`.", lambda _: tabulate(Published(), gamma=GAMMA, check_steps=300),
      lambda _: tabulate(Reveal(Published(), {"flip": 2}), gamma=GAMMA, check_steps=300)),
     ("Turn a number into such an action with a function of yours, in `gymnasium.wrappers.TransformAction`.",
      lambda _: tabulate(worded(), gamma=GAMMA),
@@ -280,7 +280,7 @@ def test_a_mend_that_a_status_names_serves(says, mdp, ill, mended):
 
 
 def test_a_table_whose_counts_show_that_states_are_hidden_is_sent_to_reveal():
-    says = "not bounded, since observations hide state: show it with `irl_gym.reveal.Reveal`"
+    says = "not bounded, since observations hide state: show it with `irl_gym.environments.reveal.Reveal`"
     assert says in counted(Flipped()) and says not in counted(Reveal(Flipped(), {"flip": 2}))
 
 

@@ -12,7 +12,7 @@ import gymnasium as gym
 import pytest
 from stable_baselines3 import PPO
 
-from irl_gym.planners import load_agent
+from irl_gym.agents.planners import load_agent
 
 ROOT = Path(__file__).parents[1]
 CALLS = re.compile(

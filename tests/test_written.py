@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from irl_gym.intervals import as_interval
-from irl_gym.page.document import embedded_json
-from irl_gym.page.panels import plotted, telling
+from irl_gym.reports.page.document import embedded_json
+from irl_gym.reports.page.panels import plotted, telling
 from irl_gym.written import listed, number, percent, seconds, sentence_of, sum_of, with_ends
 
 

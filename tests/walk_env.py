@@ -7,8 +7,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers import FrameStackObservation, TimeAwareObservation
 
-from irl_gym.copies.snapshots import Snapshots
-from irl_gym.copies.stripped import without_watchers
+from irl_gym.tables.copies.snapshots import Snapshots
+from irl_gym.tables.copies.stripped import without_watchers
 
 
 class StandIn:

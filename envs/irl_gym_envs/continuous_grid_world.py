@@ -9,9 +9,9 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.checks import checked_number
-from irl_gym.coordinates import Coordinates
+from irl_gym.environments.physics import Moves
 from irl_gym.errors import InvalidInput, InvalidParameter
-from irl_gym.physics import Moves
+from irl_gym.spaces.coordinates import Coordinates
 from irl_gym_envs.grid_rendering import AGENT, AGENT_RIM, FLOOR, FRAME, GOAL, GOAL_FLOOR, circle, segment
 from irl_gym_envs.physics_vector_env import PhysicsVectorEnv
 from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode

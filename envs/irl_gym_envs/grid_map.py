@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym.errors import InvalidParameter
-from irl_gym.mdp import TransitionTable
+from irl_gym.mdp.tabular_mdp import TransitionTable
 
 MOVES = ((-1, 0), (0, 1), (1, 0), (0, -1))
 """Rows and columns that each action moves: 0 up, 1 right, 2 down, 3 left."""

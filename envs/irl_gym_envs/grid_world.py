@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from irl_gym.environments.tabular_env import TabularEnv
 from irl_gym.errors import InvalidParameter
-from irl_gym.rewards import TabularReward
-from irl_gym.tabular_env import TabularEnv
+from irl_gym.mdp.rewards import TabularReward
 from irl_gym_envs.grid_map import Cells, GridMap, make_map, walk
 from irl_gym_envs.grid_rendering import Picture, draw_text
 from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode

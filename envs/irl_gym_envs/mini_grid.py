@@ -31,8 +31,8 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 
+from irl_gym.environments.seeded_starts import SeededStarts
 from irl_gym.errors import InvalidInput, InvalidParameter, NotInstalled
-from irl_gym.seeded_starts import SeededStarts
 from irl_gym_envs.render_modes import check_render_mode, warn_of_no_render_mode
 
 PREFIX, SUFFIX = "MiniGrid-", "-v0"

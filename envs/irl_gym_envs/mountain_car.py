@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.classic_control.mountain_car import MountainCarEnv as GymnasiumsMountainCarEnv
 
-from irl_gym.coordinates import Coordinates
+from irl_gym.environments.physics import Moves
 from irl_gym.errors import InvalidInput, InvalidParameter
-from irl_gym.physics import Moves
+from irl_gym.spaces.coordinates import Coordinates
 from irl_gym_envs.physics_vector_env import PhysicsVectorEnv
 from irl_gym_envs.render_modes import check_render_mode
 

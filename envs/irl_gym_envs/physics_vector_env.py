@@ -9,8 +9,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from irl_gym.checks import checked_number
+from irl_gym.environments.physics import Physics
 from irl_gym.errors import InvalidInput, InvalidParameter
-from irl_gym.physics import Physics
 
 
 class PhysicsVectorEnv(gym.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):

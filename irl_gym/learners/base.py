@@ -7,10 +7,10 @@ from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from irl_gym.checks import checked_number
 from irl_gym.facts import Fact
-from irl_gym.linear_reward import LinearReward
-from irl_gym.policies import Policy
-from irl_gym.rewards import TabularReward
-from irl_gym.solvers import Status, check_solving
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.mdp.policies import Policy
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.programs.solvers import Status, check_solving
 
 
 @runtime_checkable
@@ -70,7 +70,7 @@ class Learner(Protocol):
     """Turns a world without reward and an expert into a reward.
 
     The loop gives `fit` a table and what is known of the expert's policy, unless the learner says in `takes` what else: names
-    of parts of the loop (`irl_gym.loop.Loop`), the first two in this order, any other by its name.
+    of parts of the loop (`irl_gym.loop.loop.Loop`), the first two in this order, any other by its name.
     """
 
     def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:

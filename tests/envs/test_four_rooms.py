@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 from irl_gym.errors import InvalidParameter
-from irl_gym.tabulate import tabulate
+from irl_gym.tables.tabulate import tabulate
 
 ID = "irl_gym_envs:irl_gym/FourRooms-v0"
 HALLWAYS = [(3, 6), (6, 2), (7, 9), (10, 6)]

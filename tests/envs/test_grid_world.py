@@ -11,10 +11,10 @@ from models import paper_grid
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 from yardstick import yard
 
-from irl_gym.dynamic_programming import value_iteration
 from irl_gym.errors import InvalidInput, InvalidParameter
-from irl_gym.learners.finite import FiniteLP
-from irl_gym.tabulate import tabulate
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.planning.dynamic_programming import value_iteration
+from irl_gym.tables.tabulate import tabulate
 
 ID = "irl_gym_envs:irl_gym/GridWorld-v0"
 EVERYTHING = {

@@ -7,23 +7,23 @@ import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
-from irl_gym.arguments import parse_reveal
-from irl_gym.bases import Fourier, Polynomial, RadialBasis
-from irl_gym.datasets import load_minari
-from irl_gym.experiment import Experiment, parse_keywords
-from irl_gym.features import OneHot, Table, Unravel
-from irl_gym.given import FromFile
-from irl_gym.imports import from_arrays, from_d4rl, from_frame, from_imitation, from_pairs, from_rollouts
-from irl_gym.keyboard import controls_of, keys_of_line, keys_typed
-from irl_gym.learners.feature import FeatureLP
-from irl_gym.learners.finite import FiniteLP
-from irl_gym.linear_reward import LinearReward
-from irl_gym.listed_states import ListedStates
-from irl_gym.mdp import TabularMDP
-from irl_gym.policies import as_distribution
-from irl_gym.rewards import TabularReward
-from irl_gym.states import StateIndex
-from irl_gym.tabulate import make
+from irl_gym.agents.expert_files import FromFile
+from irl_gym.commands.arguments import parse_reveal
+from irl_gym.commands.keyboard import controls_of, keys_of_line, keys_typed
+from irl_gym.demonstrations.datasets import load_minari
+from irl_gym.demonstrations.imports import from_arrays, from_d4rl, from_frame, from_imitation, from_pairs, from_rollouts
+from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.features.feature_maps import OneHot, Table, Unravel
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.learners.linear_programs.feature import FeatureLP
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.policies import as_distribution
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.runs.experiment import Experiment, parse_keywords
+from irl_gym.spaces.listed_states import ListedStates
+from irl_gym.spaces.states import StateIndex
+from irl_gym.tables.tabulate import make
 
 P = np.array([[0.5, 0.5], [1.0, 0.0]])
 D0 = np.array([1.0, 0.0])

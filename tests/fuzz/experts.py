@@ -13,11 +13,11 @@ from gymnasium import spaces
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
+from irl_gym.agents.experts import load_expert, training_of
+from irl_gym.agents.shown_observations import read_shown, read_statistics, write_shown
 from irl_gym.errors import InvalidParameter
-from irl_gym.experts import load_expert, training_of
-from irl_gym.listed_states import ListedStates
-from irl_gym.shown import read_shown, read_statistics, write_shown
-from irl_gym.states import StateIndex
+from irl_gym.spaces.listed_states import ListedStates
+from irl_gym.spaces.states import StateIndex
 
 CELLS = spaces.MultiDiscrete([4, 4])
 SETTINGS = {

@@ -10,21 +10,21 @@ from forgetting import without_digests
 from fuzz import experts, runs
 from fuzz.sound import SPACE, sound_episode, sound_reward, sound_table
 
-from irl_gym.ambiguity.lambda_path import LambdaPath, lambda_path
-from irl_gym.bases import Fourier, Polynomial, RadialBasis
-from irl_gym.datasets import load_minari, read_minari, write_minari
-from irl_gym.demonstrations import Episode
-from irl_gym.dynamic_programming import policy_iteration
-from irl_gym.enumeration.explored import Explored, load_explored
-from irl_gym.features import OneHot, Table, Unravel
-from irl_gym.imports import from_d4rl, from_frame
-from irl_gym.linear_reward import LinearReward, load_reward
-from irl_gym.recorded import recorded_environment
-from irl_gym.rewards import TabularReward
-from irl_gym.shards import Shards
-from irl_gym.states import StateIndex
-from irl_gym.table_files import load_table, save_table
-from irl_gym.tabulate import tabulate
+from irl_gym.demonstrations.datasets import load_minari, read_minari, write_minari
+from irl_gym.demonstrations.imports import from_d4rl, from_frame
+from irl_gym.demonstrations.recorded import recorded_environment
+from irl_gym.demonstrations.shards import Shards
+from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
+from irl_gym.features.feature_maps import OneHot, Table, Unravel
+from irl_gym.features.linear_reward import LinearReward, load_reward
+from irl_gym.judging.ambiguity.lambda_path import LambdaPath, lambda_path
+from irl_gym.mdp.episodes import Episode
+from irl_gym.mdp.planning.dynamic_programming import policy_iteration
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.spaces.states import StateIndex
+from irl_gym.tables.enumeration.explored import Explored, load_explored
+from irl_gym.tables.table_files import load_table, save_table
+from irl_gym.tables.tabulate import tabulate
 
 LAKE = {"is_slippery": True}
 ROWS = [Episode(np.array([0, 4, 8, 9]), np.array([1, 1, 2]), np.array([0.0, 0.0, 1.0]), True, False, seed=i) for i in range(3)]

@@ -15,21 +15,21 @@ from fuzz.sound import sound_episode, sound_reward, sound_table
 from numbered import Numbered
 from rich.console import Console
 
-from irl_gym import export
-from irl_gym.claims import claim
-from irl_gym.datasets import described, read_minari
-from irl_gym.diagnoses.unfinished import left_behind
-from irl_gym.diagnosis import diagnose_run, diagnose_unfinished
-from irl_gym.experiment import Experiment
-from irl_gym.page.comparison import write_comparison
-from irl_gym.page.report import write_report
-from irl_gym.pipeline import recover_and_retrain
-from irl_gym.planners import ValueIteration
-from irl_gym.policies import as_distribution
-from irl_gym.report import print_report
-from irl_gym.run_folder import RunFolder, read_record
-from irl_gym.runs import read_run
-from irl_gym.table_files import kept_table
+from irl_gym.agents.planners import ValueIteration
+from irl_gym.demonstrations import export
+from irl_gym.demonstrations.datasets import described, read_minari
+from irl_gym.files.run_folder import RunFolder, read_record
+from irl_gym.loop.pipeline import recover_and_retrain
+from irl_gym.mdp.policies import as_distribution
+from irl_gym.reports.comparison.comparison_page import write_comparison
+from irl_gym.reports.page.report import write_report
+from irl_gym.reports.terminal_report import print_report
+from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
+from irl_gym.runs.experiment import Experiment
+from irl_gym.runs.identity import claim
+from irl_gym.runs.reading.unfinished import left_behind
+from irl_gym.runs.run import read_run
+from irl_gym.tables.table_files import kept_table
 
 ASKED = Experiment("FrozenLake-v1", 0.9, retrain=ValueIteration(), episodes=3, eval_episodes=3, num_envs=2)
 LAKE = gym.make("FrozenLake-v1")

@@ -3,8 +3,8 @@
 import numpy as np
 from gymnasium import spaces
 
-from irl_gym.rewards import TabularReward
-from irl_gym.states import StateIndex
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.spaces.states import StateIndex
 
 SPACE = spaces.Discrete(16)
 

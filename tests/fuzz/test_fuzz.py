@@ -16,9 +16,9 @@ from fuzz.readers import READERS
 from fuzz.runs import ASKED
 from hypothesis import HealthCheck, given, settings
 
-from irl_gym import experts
+from irl_gym.agents import experts
 from irl_gym.errors import InvalidParameter, IrlGymError
-from irl_gym.pipeline import recover_and_retrain
+from irl_gym.loop.pipeline import recover_and_retrain
 
 SMALL, MANY = 1_700, 95_000
 """Inputs of files; the rest of 2,000 and 100,000 are arguments."""

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from forgetting import without_digests
 
-from irl_gym.diagnosis import CHECKS, diagnose_run, diagnose_unfinished
-from irl_gym.experiment import Experiment
-from irl_gym.learners.finite import FiniteLP
-from irl_gym.learners.trajectory import TrajectoryLP
-from irl_gym.pipeline import recover_and_retrain
-from irl_gym.planners import ValueIteration
-from irl_gym.rewards import TabularReward
-from irl_gym.runs import read_run
+from irl_gym.agents.planners import ValueIteration
+from irl_gym.judging.diagnoses.doctor import CHECKS
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.loop.pipeline import recover_and_retrain
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
+from irl_gym.runs.experiment import Experiment
+from irl_gym.runs.run import read_run
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "doctor.py"
 

@@ -88,12 +88,13 @@ def test_a_taken_id_is_refused(tmp_path, run):
     assert again.returncode == 2 and f"DatasetExists: dataset '{ID}' exists" in again.stderr
 
 
-OFTEN = {"irl_gym.export:SHARD_BYTES": 3_000}
+OFTEN = {"irl_gym.demonstrations.export:SHARD_BYTES": 3_000}
 """A shard is closed after a few episodes."""
-EPISODES, ENTERED = 60, "irl_gym.export:size_of"
+EPISODES, ENTERED = 60, "irl_gym.demonstrations.export:size_of"
 MOMENTS = [
-    ("hdf5", ENTERED, 47), ("arrow", "irl_gym.export:write_files", 1), ("hdf5", "irl_gym.export:publish", 1),
-    ("arrow", "irl_gym.export:_remove", 1),
+    ("hdf5", ENTERED, 47), ("arrow", "irl_gym.demonstrations.export:write_files", 1),
+    ("hdf5", "irl_gym.demonstrations.export:publish", 1),
+    ("arrow", "irl_gym.demonstrations.export:_remove", 1),
 ]  # fmt: skip
 """Among the episodes, before the dataset is written, before it gets its name, and before what is left is cleared away."""
 

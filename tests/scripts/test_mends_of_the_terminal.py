@@ -2,7 +2,7 @@
 
 import pytest
 
-from irl_gym import loop
+from irl_gym.loop import loop
 
 CUT, OPEN, SHORT = 'desc=["SFF","HFG"]', 'desc=["SFF","FFG"]', 'desc=["SFG"]'
 PROGRAM = ("--margin-cap", "auto", "--l1", "0")

@@ -15,7 +15,7 @@ import minari
 import pytest
 from stopped import HANG
 
-from irl_gym import loop
+from irl_gym.loop import loop
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "play.py"

@@ -147,7 +147,7 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'\n"
 
 
-AGENT = "irl_gym.planners:SB3.plan"
+AGENT = "irl_gym.agents.planners:SB3.plan"
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):

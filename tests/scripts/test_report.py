@@ -51,10 +51,10 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
 @pytest.mark.parametrize(
     ("name", "arguments", "place"),
     [
-        ("report", ("--run", "run"), "irl_gym.page.report.write_report"),
-        ("doctor", ("--run", "run"), "irl_gym.diagnosis.diagnose_run"),
-        ("compare", ("run", "run"), "irl_gym.page.comparison.write_comparison"),
-        ("doctor", ("--run", "run"), "irl_gym.runs.claims"),
+        ("report", ("--run", "run"), "irl_gym.reports.page.report.write_report"),
+        ("doctor", ("--run", "run"), "irl_gym.runs.diagnosed.diagnose_run"),
+        ("compare", ("run", "run"), "irl_gym.reports.comparison.comparison_page.write_comparison"),
+        ("doctor", ("--run", "run"), "irl_gym.runs.run.claims"),
     ],
 )
 def test_a_defect_is_called_one_and_is_told_with_its_traceback(script, copied, monkeypatch, name, arguments, place):

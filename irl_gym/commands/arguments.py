@@ -1,0 +1,274 @@
+"""What the loop's command line asks for, group by group, and the experiment that it stands for."""
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast, get_args
+
+import gymnasium as gym
+from gymnasium import spaces
+
+from irl_gym.agents.expert_files import FromFile
+from irl_gym.agents.planners import Planner
+from irl_gym.commands.terminal import UNSET
+from irl_gym.demonstrations.endings import AfterEnd
+from irl_gym.errors import InvalidParameter
+from irl_gym.learners.linear_programs.feature import FeatureLP
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.runs.experiment import Experiment, parse_keywords
+from irl_gym.runs.named_parts import (
+    KNOWN,
+    FeatureName,
+    LearnerName,
+    PlannerName,
+    Reveals,
+    environment_of,
+    features_named,
+    planner_named,
+    steps_only,
+)
+from irl_gym.tables.counted.counting import Interaction
+from irl_gym.tables.enumeration.table import Enumeration
+
+
+@dataclass(frozen=True)
+class Environment:
+    """What is acted in."""
+
+    env_id: Annotated[str | None, UNSET] = None
+    """A registered environment; module:id for one of another package. The default is the dataset's, or FrozenLake-v1."""
+    env_kwargs: Annotated[tuple[str, ...], UNSET] = ()
+    """What it is made with: name=value ..., or one json object."""
+    gamma: float = 0.99
+    """Discount, between 0 and 1."""
+    start_seeds: Annotated[tuple[int, ...], UNSET] = ()
+    """Draw the layouts of resets from these seeds only; 0 fixes the layout of a MiniGrid environment."""
+    reveal: tuple[str, ...] = ("known",)
+    """Hidden integers that the observation shall show: name=number of values ...; known for those known to be hidden; none."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """How the table of its transitions is made."""
+
+    table: Literal["auto", "enumerate", "sample"] = "auto"
+    """auto: what the environment publishes, else its states enumerated; or enumerate, or count what random steps do."""
+    max_states: Annotated[int | None, UNSET] = None
+    """States that an enumeration may find; the default is 300,000."""
+    steps: Annotated[int | None, UNSET] = None
+    """Random steps that are counted (--table sample); the default is 100,000."""
+    bins: Annotated[tuple[int, ...], UNSET] = ()
+    """Make a table of continuous states: cells along each coordinate, or one number for all."""
+    samples: int = 0
+    """Points drawn in each cell, whose steps are counted; 0 for the step from its centre, shared between neighbours."""
+
+    def by(self, seed: int) -> Enumeration | Interaction | None:
+        """How a table is made."""
+        if self.steps is not None and self.table != "sample":
+            raise InvalidParameter(f"steps is {self.steps}, but table is {self.table!r}: expected --table sample with it.")
+        if self.max_states is not None and self.table == "sample":
+            raise InvalidParameter(f"max_states is {self.max_states}, but table is 'sample': expected --steps with it.")
+        if self.table == "sample":
+            return Interaction(seed=seed) if self.steps is None else Interaction(self.steps, seed=seed)
+        if self.max_states is not None:
+            return Enumeration(known=self.table == "auto", max_states=self.max_states)
+        return None if self.table == "auto" else Enumeration()
+
+
+@dataclass(frozen=True)
+class Demonstrations:
+    """Who shows what is wanted."""
+
+    expert: Annotated[str | None, UNSET] = None
+    """value-iteration, on a table; ppo, dqn or a2c, trained on the true reward; or a file, SB3's zip or an npz of actions."""
+    expert_normalize: Annotated[str | None, UNSET] = None
+    """Statistics of its observations, of a zip trained under SB3's VecNormalize: the file of its save, or an npz."""
+    epsilon: float = 0.0
+    """Probability of a random action in place of the expert's. Above 0 learners see the episodes only, not the policy."""
+    episodes: int = 500
+    """Recorded; trajectory-lp learns from them, the others from the expert's whole policy, unless it errs (--epsilon)."""
+    dataset: Annotated[str | None, UNSET] = None
+    """Learn from this Minari dataset, in place of an expert."""
+    dataset_root: Annotated[str | None, UNSET] = None
+    """Minari's root folder; the default is Minari's own."""
+    trust_dataset: bool = False
+    """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
+    after_end: AfterEnd = "refuse"
+    """Of an episode of the dataset that goes on after its end: refuse it, or cut it there."""
+
+    @property
+    def file(self) -> str | None:
+        """The expert's file; None for an expert that has a name.
+
+        Raises:
+            InvalidParameter: no such expert, or statistics of one that has no file.
+        """
+        if self.expert is None or self.expert in get_args(PlannerName):
+            if self.expert_normalize is not None:
+                raise InvalidParameter(
+                    f"expert_normalize is {self.expert_normalize!r}, but expert is {self.expert}: expected an agent's zip "
+                    "with it."
+                )
+            return None
+        if Path(self.expert).suffix in (".zip", ".npz") or Path(self.expert).exists():
+            return self.expert
+        raise InvalidParameter(
+            f"expert is {self.expert!r}: expected one of {', '.join(get_args(PlannerName))}, or a file, SB3's zip of an agent "
+            "or an npz of actions."
+        )
+
+
+@dataclass(frozen=True)
+class Learning:
+    """How the reward is recovered."""
+
+    learner: LearnerName = "finite-lp"
+    """Ng & Russell's section 3 (finite-lp), 4 (feature-lp) or 5 (trajectory-lp)."""
+    l1: float | Literal["auto"] = 0.0
+    """Price of ||R||_1, of ||alpha||_1 with features: a number, or auto for just below lambda_0 (finite-lp)."""
+    margin_cap: float | Literal["auto", "none"] = "auto"
+    """finite-lp and feature-lp. Cap on margins: a number, auto, or none for the paper's own program."""
+    slack: float | Literal["auto", "none"] = "auto"
+    """finite-lp. Price of a violation, where a margin is worth 1; none: not at any price. auto: 1 for an expert of episodes."""
+    reward_on: Literal["state", "state-action"] = "state"
+    """finite-lp. What the recovered reward is a function of."""
+    features: FeatureName = "auto"
+    """feature-lp and trajectory-lp. auto is one-hot for discrete observations, radial for others."""
+    size: Annotated[int | None, UNSET] = None
+    """Of the features: centres along each coordinate, Fourier order, or degree."""
+    coordinates: Annotated[tuple[int, ...], UNSET] = ()
+    """Values of each coordinate that a discrete observation is made of, such as 5 5 5 4 for Taxi."""
+    sample: Annotated[int | None, UNSET] = None
+    """feature-lp. States in S_0, drawn at random; the default is all."""
+    rounds: Annotated[int | None, UNSET] = None
+    """trajectory-lp. At most; the default is 30 on tables, 8 on environments that are stepped."""
+    gap_cap: Literal["auto", "none"] = "none"
+    """trajectory-lp. auto lets no policy that is far worse than the expert outweigh the others."""
+    inner: Annotated[PlannerName | None, UNSET] = None
+    """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
+    time_limit: Annotated[float | None, UNSET] = None
+    """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
+
+    @property
+    def cap(self) -> float | Literal["auto"] | None:
+        """The margin cap as learners take it."""
+        return None if self.margin_cap == "none" else self.margin_cap
+
+    def finite(self, from_episodes: bool) -> FiniteLP:
+        """The learner of section 3."""
+        slack = 1.0 if from_episodes and self.reward_on == "state" else None
+        if self.slack != "auto":
+            slack = None if self.slack == "none" else self.slack
+        return FiniteLP(
+            l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack,
+            time_limit=self.time_limit,
+        )  # fmt: skip
+
+    def linear(self, env: gym.Env, control: bool, seed: int) -> FeatureLP | TrajectoryLP:
+        """The learner of section 4 or 5."""
+        phi = features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
+        l1: Any = self.l1
+        if self.learner == "feature-lp":
+            return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed, time_limit=self.time_limit)
+        rounds = self.rounds if self.rounds is not None else 8 if control else 30
+        gap_cap = "auto" if self.gap_cap == "auto" else None
+        return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed, time_limit=self.time_limit)
+
+
+@dataclass(frozen=True)
+class Retraining:
+    """Who learns from the recovered reward."""
+
+    retrain: PlannerName = "ppo"
+    """Who it is."""
+    shaping: bool = True
+    """Retrain on the expected advantage under the recovered reward, computed from the table; else on the reward as it is."""
+    total_timesteps: Annotated[int | None, UNSET] = None
+    """Environment steps of each SB3 agent; the default is 400,000 on tables, 60,000 on environments that are stepped."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Recover a reward from an expert, retrain an agent that sees only that reward, and judge it under the true one."""
+
+    environment: Environment = Environment()
+    """What is acted in."""
+    table: Table = Table()
+    """How the table of its transitions is made."""
+    demonstrations: Demonstrations = Demonstrations()
+    """Who shows what is wanted."""
+    learning: Learning = Learning()
+    """How the reward is recovered."""
+    retraining: Retraining = Retraining()
+    """Who learns from the recovered reward."""
+    seed: int = 0
+    """Of everything that is drawn."""
+    out: Annotated[Path | None, UNSET] = None
+    """Where the run is kept, and continued if it was killed. The default is a folder of its own under runs/."""
+
+    def experiment(self) -> Experiment:
+        """What the arguments ask for.
+
+        Raises:
+            InvalidParameter: arguments that contradict each other, or are outside their range.
+            UnknownEnvironment, DatasetMissing: no such environment or dataset, where a learner has to know it.
+        """
+        given, shown = self.environment, self.demonstrations
+        env_id = given.env_id or (None if shown.dataset else "FrozenLake-v1")
+        env_kwargs, reveal = parse_keywords(given.env_kwargs), parse_reveal(given.reveal)
+        control = discrete = False
+        if self.learning.learner == "finite-lp":
+            learner: Any = self.learning.finite(from_episodes=shown.dataset is not None or shown.epsilon > 0)
+        else:
+            env = environment_of(
+                env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal,
+                trust_dataset=shown.trust_dataset,
+            )  # fmt: skip
+            control = not self.table.bins and steps_only(env)
+            discrete = isinstance(env.observation_space, spaces.Discrete)
+            learner = self.learning.linear(env, control, self.seed)
+        shaped = self.retraining.shaping and not control
+
+        def planner(name: PlannerName | None, *, advantages: bool = False) -> Planner | None:
+            if name is None and control:
+                name = "ppo"
+            steps = self.retraining.total_timesteps
+            return planner_named(name, steps, advantages=advantages, control=control, discrete=discrete)
+
+        file, bins = shown.file, self.table.bins
+        named = planner(cast("PlannerName | None", shown.expert)) if file is None else None
+        expert = named if file is None else FromFile.at(file, shown.expert_normalize)
+        return Experiment(
+            env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
+            bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
+            shown.trust_dataset,
+            shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner,
+            inner=planner(self.learning.inner), shaping=self.retraining.shaping,
+            retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
+        )  # fmt: skip
+
+
+def parse_reveal(parts: Sequence[str]) -> Reveals:
+    """What is to be revealed, given as text: "known", "none", or name=number of values or name=[value, value] ...
+
+    Raises:
+        InvalidParameter: anything else.
+    """
+    if list(parts) in ([KNOWN], ["none"], []):
+        return KNOWN if list(parts) == [KNOWN] else {}
+    found: dict[str, int | list[Any]] = {}
+    for part in parts:
+        name, equals, values = part.partition("=")
+        try:
+            read = int(values) if values.isdecimal() else ast.literal_eval(values)
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):  # of too many digits, and of unhashable keys
+            read = None
+        if not equals or not isinstance(read, int if values.isdecimal() else list):
+            raise InvalidParameter(
+                f"reveal has {part!r}: expected name=number of values, such as step_count=100, or a list of them, such as "
+                "last=[None,0,1]; or known, or none."
+            )
+        found[name] = read
+    return found

@@ -1,0 +1,197 @@
+"""What metrics.json and certificate.json hold: see `run_schema`."""
+
+from typing import Annotated, Any, Literal, NotRequired
+
+from pydantic import AfterValidator, Field
+from typing_extensions import TypedDict
+
+from irl_gym.files.run_schema import Count, Lost, Number, Pair, StatusName, Text
+
+TOGETHER = {
+    "n_features": ("rank",), "expressible": ("n_features", "states"), "regret": ("regret_error",),
+    "gaps": ("gap_errors", "regret", "truncation", "horizon", "n_features"), "loss_low": ("expert_optimal",),
+    "distance": ("distance_error",), "worst_tie_regret": ("worst_tie_regret_share",),
+}  # fmt: skip
+"""Of what a learner says of its reward: entries that are read with another."""
+
+
+def _together(told: Any) -> Any:
+    """Refuse entries without those that are read with them."""
+    for one, others in TOGETHER.items():
+        lacking = [other for other in others if one in told and other not in told]
+        if lacking:
+            raise ValueError(f"{lacking[0]} beside {one}")
+    return told
+
+
+def _gaps(told: Any) -> Any:
+    """Refuse a reward that is judged by sampled values without as many errors as gaps."""
+    gaps, errors = told.get("gaps", ()), told.get("gap_errors", ())
+    if len(gaps) != len(errors) or ("regret" in told) is not bool(gaps):
+        raise ValueError("as many gaps as gap_errors, and one at least where there is a regret")
+    return told
+
+
+class Proof(TypedDict, total=False):
+    """What is known of a reward, whichever learner it is of."""
+
+    zero: bool
+    expressible: bool
+    fell_short: bool
+    objective: Number | None
+    duality_gap: Number | None
+    l1: Number
+    slack: Number | None
+    lambda_0: Number | None
+    margin_cap: Number | None
+    l1_norm: Number
+    least_l1_norm: Number | None
+    alpha_l1_norm: Number
+    loss_low: Number | None
+    loss_bound: Number | None
+    loss_share: Number | None
+    worst_violation: Number
+    sampling_error: Number | None
+    standard_error: Number | None
+    regret: Number
+    regret_error: Number | None
+    distance: Number
+    distance_error: Number | None
+    truncation: Number
+    horizon: Count
+    n_features: Count
+    rank: Count
+    trivial: Count
+
+
+class _Part(Proof, total=False):
+    expert_optimal: bool | None
+    degenerate: bool
+    states: Count
+    margin: list[Number | None]
+    gaps: list[Number]
+    gap_errors: list[Number | None]
+    unbreakable_rows: list[Pair]
+    inseparable: list[Count]
+    marginless: list[Count]
+    unbreakable: list[Count]
+    unconstrained: list[Count]
+    unknown: list[Count]
+    unsettled: list[Count]
+    violated: list[Count]
+
+
+Part = Annotated[_Part, AfterValidator(_together), AfterValidator(_gaps)]
+
+
+class Certificate(TypedDict):
+    """certificate.json, of `certificates.certificate_of`, but for its facts, which `facts.facts_of` reads."""
+
+    optimality: Part | None
+    proof: Part
+
+
+class _Rewarded(Proof):
+    learner: Text
+    status: StatusName
+    expert_optimal: bool | None
+    degenerate: bool
+    rounds: NotRequired[Count]
+    best_round: NotRequired[Count]
+    states: NotRequired[Count]
+    inseparable_states: NotRequired[Count]
+    marginless_states: NotRequired[Count]
+    unbreakable_states: NotRequired[Count]
+    unconstrained_states: NotRequired[Count]
+    unknown_states: NotRequired[Count]
+    unsettled_states: NotRequired[Count]
+    violated_states: NotRequired[Count]
+    reward_on: NotRequired[Literal["state", "state-action"]]
+    worst_tie_regret: NotRequired[Number]
+    worst_tie_regret_share: NotRequired[Number | None]
+    starc: NotRequired[Number | None]
+    epic: NotRequired[Number | None]
+
+
+class Row(TypedDict):
+    """How good a policy is."""
+
+    value: Number
+    score: Number | None
+    mean_return: Number | None
+    return_low: Number | None
+    return_high: Number | None
+    agreement: Number | None
+    how: Text
+    sampled_value: NotRequired[Number]
+    sampled_low: NotRequired[Number | None]
+    sampled_high: NotRequired[Number | None]
+    loses_at_most: NotRequired[Number | None]
+
+
+def _three(rows: Any) -> Any:
+    """Refuse rows that lack one of those that every run judges."""
+    lacking = [name for name in ("expert", "random", "retrained") if name not in rows]
+    if lacking:
+        raise ValueError(f"a policy {lacking[0]}")
+    return rows
+
+
+class Worth(TypedDict):
+    """The interval of the expert's value."""
+
+    episodes: Count | None
+    low: Number | None
+    high: Number | None
+
+
+class Check(TypedDict):
+    """How a table was checked, of `SelfCheck`."""
+
+    steps: Count
+    p_value: Number
+    episodes: NotRequired[Count]
+
+
+class Sized(TypedDict):
+    """How big a table is, and how far it is to be trusted."""
+
+    states: Count
+    reachable: Count
+    actions: Count
+    transitions: Count
+    exact: bool
+    method: Text
+    checked: Text | None
+    check: Check | None
+    horizon: NotRequired[Count | None]
+    split: NotRequired[Count]
+    counted: NotRequired[bool]
+    error: NotRequired[Number | None]
+    errors: NotRequired[list[Annotated[list[Text], Field(min_length=2, max_length=2)]]]
+    hidden_state: NotRequired[Text | None]
+
+
+class Demonstrated(Lost):
+    """What was shown of the expert."""
+
+    episodes: Count
+    given: bool
+    episodes_only: bool
+    trained_return: NotRequired[Number]
+    vecnormalize: NotRequired[bool]
+
+
+Training = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Count | None, "steps_to_0.99": Count | None})
+
+
+class Metrics(TypedDict):
+    """metrics.json, of `scorecard.scorecard`."""
+
+    policies: Annotated[dict[str, Row], AfterValidator(_three)]
+    reward: Annotated[_Rewarded, AfterValidator(_together)]
+    training: Training
+    table: Sized | None
+    demonstrations: Demonstrated
+    score_reason: NotRequired[Text | None]
+    expert_value: NotRequired[Worth]

@@ -1,0 +1,80 @@
+"""The closed loop in one call: environment -> expert -> Minari -> LP-IRL -> reward -> SB3 -> how good it is."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+from irl_gym.environments.reveal import Reveal
+from irl_gym.files.own_files import held
+from irl_gym.loop.loop import Loop
+from irl_gym.loop.stages import OnProgress
+from irl_gym.runs.experiment import Experiment
+from irl_gym.runs.identity import STAGES
+from irl_gym.runs.run import read_run
+from irl_gym.runs.summary import Report
+from irl_gym.tables.tabulation import Tabulation
+
+
+def recover_and_retrain(
+    experiment: Experiment,
+    out: str | os.PathLike,
+    on_progress: OnProgress | None = None,
+    command: Sequence[str] | None = None,
+) -> Report:
+    """Recover a reward from an expert, retrain an agent on it, and judge the agent under the true reward.
+
+    Leaves under `out`:
+        config.json, run.json, environment.json       what was asked, who wrote it, where it took place
+        table.npz, expert.npz, dataset/ (Minari)      expert.zip where there is no table; a dataset given is not copied
+        reward.npz, certificate.json                  what was learned
+        agent.zip, agent_policy.npz                   who was retrained; agent.shown.npz where it was shown rows of states
+        learning_curve.csv, tensorboard/              how
+        metrics.json, metrics.csv, figures/           how good it is
+        films/, grid.json                             episodes to watch; the map of a grid
+        diagnosis.json, ambiguity.npz                 what the doctor says; for small tables, how far the reward is left open
+        report.html                                   all of it, on a page
+    The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
+    that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage.
+    .stages/ has the sha256 of every file that is read again: one that is another is named, and nothing is made from it.
+
+    Args:
+        experiment: what to do.
+        out: a new or empty folder, or one that holds this same experiment.
+        on_progress: called with a stage and the share of it that is done.
+        command: the command that reproduces the run, kept in run.json; None where it is started from Python.
+
+    Raises:
+        UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made, and the learner needs one.
+        DatasetMissing, DatasetMismatch: no such dataset, or one of another environment.
+        DegenerateExpert: no reward prefers the expert's actions.
+        SolverTimeout, SolverFailed: a linear program without an answer.
+        RunConflict: the folder holds another run, another process works in it, or a link in it leads out of it.
+        RunIncomplete: the run was finished before, and what it says of itself is not what its files give.
+        RunNewer: the folder holds a run of a newer version.
+        WriteFailed: the disk became full, or the folder was deleted meanwhile.
+    """
+    with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
+        loop = Loop(experiment, out, on_progress, command)
+        stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
+        found = loop.judged, loop.certificate
+        metrics, certificate = _read_again(loop.path, loop.world.table) if stages["report"].get("kept") else found
+    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), _shown(loop.env))
+
+
+def _read_again(path: Path, table: Tabulation | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """The metrics and the certificate of a run that was finished before, which may have been changed since."""
+    run = read_run(path, table)
+    return run.metrics, run.certificate
+
+
+def _shown(env: gym.Env) -> Mapping[str, int]:
+    """What wrappers show of the state that the environment hides."""
+    shown: dict[str, int] = {}
+    while isinstance(env, gym.Wrapper):
+        if isinstance(env, Reveal):
+            shown |= {name: n if isinstance(n, int) else len(n) for name, n in env.shown.items()}
+        env = env.env
+    return shown

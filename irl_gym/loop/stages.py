@@ -1,0 +1,150 @@
+"""The stages of a run up to the judgement: each writes into a folder what it makes of what it needs, and returns its record.
+
+A stage is one or several functions, of which those are called whose needs are there (`needs`): an expert is planned where one
+may be, and read from the dataset where there is one. Parts are those of `irl_gym.loop.loop.Loop.sources`.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym.agents.expert_files import FromFile
+from irl_gym.agents.planners import SB3, Agent, Planner
+from irl_gym.demonstrations.datasets import load_minari, write_minari
+from irl_gym.demonstrations.demonstrated import most_frequent
+from irl_gym.demonstrations.endings import AfterEnd, left_out
+from irl_gym.demonstrations.minari_files import dataset_name, unkept
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.files.run_folder import LOGS, write_json
+from irl_gym.judging.curves import Curve, write_curve
+from irl_gym.judging.evaluation import evaluate
+from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED
+from irl_gym.learners.base import Learner
+from irl_gym.loop.learning_curve import Glances
+from irl_gym.loop.worlds import World
+from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
+from irl_gym.mdp.policies import Policy
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.runs.certificates import certificate_of
+from irl_gym.runs.logs import log_scalars, logged
+from irl_gym.runs.scorecard import came_about, how_of, scorecard
+from irl_gym.tables.tabulation import Tabulation
+
+OnProgress = Callable[[str, float], None]
+"""Called with a stage and the share of it that is done, from 0 to 1."""
+
+
+def planned_expert(folder: Path, teacher: Planner, world: World, epsilon: float, report_progress: OnProgress) -> dict[str, Any]:
+    """An expert that plans, or learns, under the true reward."""
+    policy = world.train(logged(teacher, folder / LOGS / "expert"), None, _share(report_progress, "expert", teacher))
+    world.keep(policy, folder, "expert", epsilon)
+    made = {"environment_steps": 0, **teacher.trained()} if isinstance(teacher, FromFile) else _steps(policy)
+    return {"planner": type(teacher).__name__, "how": how_of(teacher), **made}
+
+
+def recorded_expert(folder: Path, dataset: str, seen: EmpiricalPolicy | None) -> dict[str, Any]:
+    """What a dataset shows of an expert, in the states of a table."""
+    if seen is None:
+        return {"planner": "unknown: the dataset's"}
+    np.savez(folder / "expert.npz", actions=most_frequent(seen))
+    return {"planner": "most frequent action of the dataset", "states_seen": int(seen.visited.sum())}
+
+
+def recorded_episodes(
+    dataset: str, dataset_root: str | None, after_end: AfterEnd, given: list[Episode], demonstrations: list[Episode],
+) -> dict[str, Any]:  # fmt: skip
+    """The episodes of a dataset, which stays where it is."""
+    taken = sum(map(len, demonstrations))
+    recorded = {"dataset_id": dataset, "episodes": len(demonstrations), "steps_recorded": taken}
+    steps = load_minari(dataset, root=dataset_root).total_steps if after_end == "cut" else None
+    return recorded | left_out(given, demonstrations, steps)
+
+
+def played_episodes(
+    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: World, expert: Any, gamma: float, episodes: int,
+    eval_episodes: int, seed: int,
+) -> dict[str, Any]:  # fmt: skip
+    """Episodes of an expert that was planned, as a Minari dataset."""
+    recorded = world.episodes(expert, episodes, seed)
+    chance = world.episodes(world.random, eval_episodes, seed)
+    dataset_id, root, lost = dataset_name(env_id), folder / "dataset", unkept(env.spec)
+    root.mkdir()
+    about = f"Expert demonstrations of {env_id}, gamma {gamma}, seed {seed}."
+    write_minari(
+        recorded, dataset_id, None if lost else env, root=root, algorithm=type(teacher).__name__,
+        observation_space=env.observation_space, action_space=env.action_space,
+        description=f"{about} {lost}" if lost else about,
+        code_permalink="scripts/recover_and_retrain.py of irl_gym",
+        random_return=float(np.mean([episode.total_reward for episode in chance])),
+        expert_return=float(np.mean([episode.total_reward for episode in recorded])),
+    )  # fmt: skip
+    return {
+        "dataset_id": dataset_id,
+        "episodes": len(recorded),
+        "environment_steps": sum(map(len, recorded)),
+        "seed": seed,
+        **({"no_environment": lost} if lost else {}),
+    }
+
+
+def recovered_reward(
+    folder: Path, learner: Learner, lesson: Mapping[str, Any], table: Tabulation | None, known_expert: Any, from_episodes: bool
+) -> dict[str, Any]:
+    """The reward that a learner finds, and what it proves; the lesson is what the learner takes."""
+    world, expert, *more = lesson
+    result = learner.fit(lesson[world], lesson[expert], **{name: lesson[name] for name in more})
+    result.reward.save(folder / "reward.npz")
+    known = None if table is None else (table, known_expert)
+    write_json(folder / "certificate.json", certificate_of(result, known, episodes=from_episodes))
+    record = {"learner": type(learner).__name__, **result.record()}
+    if "simulator" in lesson:
+        record["stats"]["inner"] = type(lesson["simulator"].planner).__name__
+    return record
+
+
+def retrained_agent(
+    folder: Path, retrainer: Planner, world: World, learned: TabularReward | LinearReward, shaping: bool,
+    certificate: Mapping[str, Any], report_progress: OnProgress,
+) -> dict[str, Any]:  # fmt: skip
+    """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
+    paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"].get("margin_cap"))
+    glances = Glances(world, _share(report_progress, "agent", retrainer))
+    log = folder / LOGS / "retrained"
+    policy = world.train(logged(retrainer, log), paid, glances.see)
+    world.keep(policy, folder, "agent")
+    curve = glances.curve()
+    write_curve(curve, folder / "learning_curve.csv")
+    if isinstance(retrainer, SB3):
+        log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
+    return {"planner": type(retrainer).__name__, "how": how_of(retrainer), **_steps(policy)}
+
+
+def metrics(
+    folder: Path, world: World, expert: Any, agent: Any, given: list[Episode] | None, demonstrations: list[Episode],
+    from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None, horizon: int | None,
+    tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
+    certificate: Mapping[str, Any], curve: Curve,
+) -> dict[str, Any]:  # fmt: skip
+    """How good everything is under the true reward."""
+    how = came_about(config, records)
+    rows, scale = evaluate(
+        {EXPERT: (expert, how[EXPERT]), RANDOM: (world.random, how[RANDOM]), RETRAINED: (agent, how[RETRAINED])},
+        world, table, horizon, given=None if given is None else demonstrations, episodes_only=from_episodes,
+        episodes=eval_episodes, seed=seed,
+    )  # fmt: skip
+    content = scorecard(config, records, certificate, rows, scale, curve, table, horizon, tabular)
+    write_json(folder / "metrics.json", content)
+    return {}
+
+
+def _share(report_progress: OnProgress, stage: str, planner: Planner) -> Callable[[int, Policy], None]:
+    total = max(1, getattr(planner, "total_timesteps", 1))
+    return lambda steps, _: report_progress(stage, min(1.0, steps / total))
+
+
+def _steps(policy: Policy) -> dict[str, int]:
+    """Environment steps that a policy was trained on."""
+    return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0}

@@ -1,0 +1,97 @@
+"""What each row of (4) is worth under a reward, and how sure that is (Ng & Russell 2000, section 3.1).
+
+A row is decided by itself: it holds, is violated, or is neither for certain; a margin counts beyond the rounding of the table's
+own numbers and what the solver of R left open. Axes: S states, A actions, n rows of (4).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from irl_gym._typing import Matrix, Vector
+from irl_gym.mdp.optimality_rows import Comparisons
+from irl_gym.mdp.planning.discounted import Discounted
+from irl_gym.mdp.planning.howard import Optimum
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
+
+
+def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
+    """(n,) rows that a margin is taken over: not an equality, and not trivial for the reward's kind."""
+    return ~comparisons.equal & ~comparisons.trivial if reward.on_states else ~comparisons.equal
+
+
+def row_margins(
+    mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, discounted: Discounted | None = None
+) -> np.ndarray:
+    """(n,) the margin of each row of (4) under a reward: Q(s, pi) - Q(s, a), for rewards on states as in (4).
+
+    `discounted` is I - gamma P_pi where it was factorised before.
+    """
+    discounted = discounted or Discounted(mdp.P_pi(comparisons.distribution), mdp.gamma)
+    if reward.on_states:
+        return comparisons.rows @ discounted.solve(reward.values)
+    R = reward.expected(mdp)
+    V = discounted.solve(mdp.mixing(comparisons.distribution) @ R.ravel())
+    stacked = comparisons.states * mdp.n_actions + comparisons.actions
+    return V[comparisons.states] - R.ravel()[stacked] - mdp.gamma * (mdp.P[stacked] @ V)
+
+
+def least_per_state(values: np.ndarray, states: np.ndarray, n_states: int) -> Vector:
+    """(S,) the smallest value of each state's rows; NaN where it has none."""
+    least = np.full(n_states, np.inf)
+    np.minimum.at(least, states, values)
+    return np.where(np.isfinite(least), least, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """What each row of (4) is worth under a reward."""
+
+    values: np.ndarray
+    """(n,) the expert's action less the other, in units of value."""
+    unsure: np.ndarray
+    """(n,) they are within this of the exact ones, on a counted table of those of the same later values."""
+    none: np.ndarray
+    """(n,) a margin or a violation up to this is none: the rounding of the table's numbers, and what the solver of R left."""
+    worth: Vector
+    """(S,) what arriving in a state is worth: the margins are differences of its means."""
+
+    def violations(self, equal: np.ndarray) -> np.ndarray:
+        """(n,) by how much a row is violated; rows that are `equal` (n,) to either side."""
+        return np.where(equal, np.abs(self.values), np.maximum(-self.values, 0.0))
+
+    def violated(self, equal: np.ndarray) -> np.ndarray:
+        """(n,) rows that are violated for certain."""
+        return self.violations(equal) - self.unsure > self.none
+
+    def hold(self, equal: np.ndarray) -> np.ndarray:
+        """(n,) rows that hold for certain."""
+        return np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+
+
+def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None = None) -> Margins:
+    """The margins of (4) under the reward of an optimum: V_pi(s) - Q_pi(s, a), where pi is the expert everywhere.
+
+    `tolerance` is what the solver of R left open; None for the reward's own.
+    """
+    behind, unsure = found.behind(comparisons.distribution)
+    return _margins(found, comparisons, *found.less_than(behind, unsure), found.V - behind, tolerance)
+
+
+def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
+    """The same where everybody acts best afterwards: Q*(s, pi) - Q*(s, a)."""
+    (gap, wide), mine = found.gaps, comparisons.distribution
+    gap = gap - (mine * gap).sum(axis=1, keepdims=True)
+    return _margins(found, comparisons, gap, wide + (mine * wide).sum(axis=1, keepdims=True), found.V, None)
+
+
+def _margins(
+    found: Optimum, comparisons: Comparisons, values: Matrix, unsure: Matrix, V: Vector, tolerance: float | None
+) -> Margins:
+    at, reward = (comparisons.states, comparisons.actions), found.table.reward
+    left = reward.tolerance if tolerance is None else tolerance
+    worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
+    moved = ~(comparisons.trivial & reward.on_states)  # the others are 0 whatever the reward
+    noise = 0.0 if comparisons.sampling is None else comparisons.sampling.of_margins(worth)
+    return Margins(values[at] * moved, unsure[at] * moved + noise, found.level[at] + left, worth)

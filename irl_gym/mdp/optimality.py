@@ -1,0 +1,251 @@
+"""Is an expert optimal under a reward, by what margin, and in which states? Of any reward, whoever made it: `certify`.
+
+Recomputed from P, the expert and R alone: what the best policy earns more (`loss`), and row by row whether (4) of Ng & Russell
+(2000) holds. A violation or a margin counts beyond its own rounding and what the solver of R left open
+(`TabularReward.tolerance`). The margin of a row is how much more the expert's action is worth than another, Q(s, pi) - Q(s, a),
+    where the expert goes on     if it is known in every state and taken at its word: (4), with V = (I - gamma P_pi)^-1 R (5)
+    where one acts best          if it is not known in some state, or errs: then nothing is made up of what it does later
+What a learner's program says of a reward, its terms, its gap and its bound, is the learner's proof.
+Axes: S states, A actions, n rows of (4) among the reachable states.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym._typing import Indices, Numbers, Vector
+from irl_gym.checks import any_array
+from irl_gym.errors import InvalidParameter
+from irl_gym.facts import Fact, aligned, counted, plain
+from irl_gym.mdp.loss import AT_STAKE, loss_on, told_loss
+from irl_gym.mdp.margins import Margins, best_margins, comparable, least_per_state, margins_of
+from irl_gym.mdp.optimality_rows import Comparisons, as_compared, compare
+from irl_gym.mdp.planning.dynamic_programming import optimum
+from irl_gym.mdp.policies import as_distribution, completed
+from irl_gym.mdp.rewards import TabularReward, as_reward
+from irl_gym.mdp.sampling_error import counted_table
+from irl_gym.mdp.tabular_mdp import TabularMDP
+
+ROUNDING = 1e-9
+"""Share of the largest |R| up to which rewards are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimality:
+    """What a reward says of an expert. States that cannot be reached from d0 are not judged."""
+
+    expert_optimal: bool | None
+    """Is the expert optimal under R? None where it is undecided: by `loss_bound`, or by what its unknown actions may lose."""
+    loss_low: float
+    """The best policy earns at least this more than the expert from d0 under R, in units of value, rounding included."""
+    loss_bound: float
+    """And at most this: in unknown states that the expert may reach, over all that it may do there."""
+    loss_share: float
+    """`loss_bound` as a share of what is at stake (`loss`); NaN where every action is tied."""
+    at_stake: float
+    """What is at stake, at most, in units of value; 0 where every action is tied."""
+    errs: bool
+    """Was the expert taken for one that may err?"""
+    worst_violation: float
+    """The largest violation of (4), in units of value; 0 when none."""
+    margin: Vector
+    """(S,) smallest margin of the expert over another action, of the rows of (4) that R can move and that were not given as
+    unbreakable; NaN where there is none."""
+    constant: bool
+    """Does R have the same value everywhere? Where episodes end it may prefer much: see `degenerate`."""
+    zero: bool
+    """Is R zero everywhere?"""
+    indifferent: bool
+    """Is the expert tied, to rounding, in every row of (4)?"""
+    unconstrained: Indices
+    """Reachable states, not terminal, where the expert is known and no action that it leaves out can be told from its own."""
+    inseparable: Indices
+    """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
+    marginless: Indices
+    """Reachable states with rows but without a positive margin under R: tied or violated."""
+    violated: Indices
+    """States with a violated row of (4)."""
+    violated_rows: np.ndarray
+    """(v, 2) state and action of each violated row: the action is worth more than the expert's under R."""
+    violations: Numbers
+    """(v,) by how much each is violated, in units of value."""
+    unknown: Indices
+    """Reachable states, not terminal, in which nothing is known of the expert: no rows, not judged."""
+    sampling_error: float | None
+    """The largest error of a margin on a counted table, of pairs that were visited; None where the table is exact."""
+    unsettled: Indices
+    """Reachable states of a counted table in which a margin above 0 is within its sampling error."""
+
+    @property
+    def degenerate(self) -> bool:
+        """Does R say nothing: is the expert tied with every action in every state judged, as under R = 0?"""
+        return self.zero or self.indifferent
+
+    @property
+    def tied(self) -> Indices:
+        """Reachable states in which another action is as good as the expert's, to rounding, and none is better."""
+        return np.setdiff1d(self.marginless, self.violated)
+
+    def facts(self) -> tuple[Fact, ...]:
+        """All of this, in sentences."""
+        return (*self._of_the_whole(), *self._of_states())
+
+    def _of_the_whole(self) -> Iterator[Fact]:
+        bounds = self.loss_low, self.loss_bound, self.loss_share
+        told = told_loss(self.expert_optimal, *bounds, self.unknown.size)
+        good = "plain" if self.degenerate or self.unsettled.size else "good"
+        mood = "open" if self.expert_optimal is None else good if self.expert_optimal else "bad"
+        yield Fact("expert optimal under it", told, mood)
+        if np.isfinite(self.loss_share) and self.loss_bound:
+            yield Fact("at stake", f"{self.at_stake:.4g}: {AT_STAKE}")
+        if self.sampling_error is not None:
+            yield Fact("judged on", counted_table(self.sampling_error), "open")
+        if self.degenerate:
+            yield Fact("degenerate", "R is zero" if self.zero else "R ties the expert with every action", "bad")
+        finite = self.margin[np.isfinite(self.margin)]
+        span = f"{finite.min():.3g} to {finite.max():.3g} in {counted(finite.size)}" if finite.size else "none"
+        later = "one acts best" if self.errs or self.unknown.size else "the expert goes on"
+        yield Fact("margins", f"{span}: how much better the expert's action is than the next, where {later} afterwards")
+
+    def _of_states(self) -> Iterator[Fact]:
+        if self.violated.size:
+            rows, most = counted(len(self.violated_rows), "action"), f"{self.worst_violation:.3g}"
+            told = f"in {counted(self.violated.size)} another action is better under it: {rows}, by at most {most}"
+            yield Fact("violated", told, "bad")
+        if self.tied.size and not self.zero:
+            told = f"in {counted(self.tied.size)} another action is as good as the expert's to rounding, and none better"
+            yield Fact("tied", told, "open")
+        if self.unsettled.size:
+            told = f"in {counted(self.unsettled.size)} a margin is within its sampling error, and may be noise"
+            yield Fact("left open by the counts", f"{told}; more steps to count tell", "open")
+        if self.inseparable.size:
+            sure = "" if self.sampling_error is None else ", as far as the counts tell"
+            told = f"in {counted(self.inseparable.size)} an action leads where the expert's own does{sure}: no reward on states"
+            yield Fact("cannot be settled", f"{told} tells them apart, one on states and actions can", "open")
+        if self.unconstrained.size:
+            told = f"in {counted(self.unconstrained.size)} no action that the expert leaves out can be told from its own"
+            yield Fact("without a comparison", told)
+        if self.unknown.size:
+            told = f"in {counted(self.unknown.size)} that can be reached nothing is known of it, and nothing is asked of it"
+            yield Fact("expert not seen", told)
+
+    def __str__(self) -> str:
+        """The facts, line by line."""
+        return aligned(self.facts())
+
+    def to_json(self) -> dict[str, Any]:
+        """As json holds it: NaN and infinity become None."""
+        return plain(self, "degenerate")
+
+
+def certify(
+    mdp: TabularMDP,
+    expert: Any,
+    reward: TabularReward | np.ndarray,
+    *,
+    errs: bool = False,
+    unbreakable: Any = None,
+) -> Optimality:
+    """What a reward says of an expert, whoever made it.
+
+    Args:
+        mdp: the MDP; only states reachable from d0 are judged.
+        expert: (S,) actions, (S, A) probabilities or (S, A) set. Rows of NaN say that nothing is known of it in a state, where
+            it may do anything.
+        reward: (S,) or (S, A).
+        errs: the expert may err, as one that is known by its episodes. What follows an action is then worth what acting best
+            is, and of several actions that it takes some may be worse; otherwise all have to be as good.
+        unbreakable: (u, 2) states and actions of rows that no reward makes strict, as a program found: `margin` and
+            `marginless` leave them out, one by one.
+
+    Raises:
+        InvalidPolicy: an expert of the wrong shape or content.
+        InvalidReward: a reward of the wrong shape.
+        InvalidParameter: rows that the table does not have.
+    """
+    reward = as_reward(reward)
+    reward.expected(mdp)  # checks the shape
+    policy, known = completed(expert, mdp.n_states)
+    distribution = as_distribution(policy, mdp.n_states, mdp.n_actions)
+    rows = np.flatnonzero(mdp.reachable)
+    part, R = mdp.restrict(rows), reward.of_rows(rows)
+    unknown = ~known[rows] & ~part.terminal
+    c = compare(part, distribution[rows], np.flatnonzero(~unknown))
+    found = optimum(as_compared(part, c, R.on_states), R)
+    best = errs or bool(unknown.any())
+    margins = best_margins(found, c) if best else margins_of(found, c)
+    loss = loss_on(part, found, c.distribution, unknown)
+    paid = R.values if R.on_states else R.values[~part.terminal]
+    largest = float(np.abs(paid).max(initial=0.0))
+    return Optimality(
+        expert_optimal=loss.optimal,
+        loss_low=loss.low,
+        loss_bound=loss.high,
+        loss_share=loss.share,
+        at_stake=loss.scale_high,
+        errs=errs,
+        constant=not paid.size or bool(np.ptp(paid) <= ROUNDING * largest),
+        zero=largest == 0.0,
+        unknown=rows[unknown],
+        **_of_rows(mdp, rows, c, R, margins, unknown, c.equal & (not best), _left_out(mdp, rows, c, unbreakable)),
+    )
+
+
+def _of_rows(
+    mdp: TabularMDP, rows: Indices, c: Comparisons, R: TabularReward, margins: Margins, unknown: np.ndarray, equal: np.ndarray,
+    left_out: np.ndarray,
+) -> dict[str, Any]:  # fmt: skip
+    """What the rows of (4) say, each by itself.
+
+    Args:
+        mdp: the whole MDP.
+        rows: (r,) its states in the part.
+        c: the rows of (4) in the part.
+        R: the reward on the part.
+        margins: of each row.
+        unknown: (r,) states without rows, as nothing is known of the expert.
+        equal: (n,) rows that are violated to either side.
+        left_out: (n,) rows that no margin is taken over.
+    """
+    usable = comparable(c, R)
+    kept = usable & ~left_out
+    margin = np.full(mdp.n_states, np.nan)
+    margin[rows] = least_per_state(margins.values[kept], c.states[kept], rows.size)
+    violations = margins.violations(equal)
+    which = np.flatnonzero(margins.violated(equal))
+    error, unsettled = None, np.zeros_like(kept)
+    if c.sampling is not None:
+        error, unsettled = c.sampling.unsettled(margins.values, margins.worth, kept, margins.none)
+    acting = np.flatnonzero(~unknown & ~mdp.terminal[rows])
+
+    def named(chosen: np.ndarray) -> Indices:
+        return rows[np.unique(c.states[chosen])].astype(np.int64)
+
+    return {
+        "worst_violation": float(violations.max(initial=0.0)),
+        "margin": margin,
+        "indifferent": bool((np.abs(margins.values) <= margins.none).all()),
+        "unconstrained": rows[np.setdiff1d(acting, c.states[usable])],
+        "inseparable": named(c.trivial & ~c.equal & R.on_states),
+        "marginless": named(kept & (margins.values <= margins.none)),
+        "violated": named(which),
+        "violated_rows": c.pairs(rows, which),
+        "violations": violations[which],
+        "sampling_error": error,
+        "unsettled": named(unsettled),
+    }
+
+
+def _left_out(mdp: TabularMDP, rows: Indices, c: Comparisons, unbreakable: Any) -> np.ndarray:
+    """(n,) which rows of (4) are among those given as unbreakable."""
+    given = () if unbreakable is None else unbreakable
+    pairs = any_array("unbreakable", given, "(u, 2) states and actions", InvalidParameter)
+    if pairs.size == 0:
+        return np.zeros(c.states.size, dtype=bool)
+    shape = np.array([mdp.n_states, mdp.n_actions])
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu" or not ((pairs >= 0) & (pairs < shape)).all():
+        told = f"{mdp.n_states} states and {mdp.n_actions} actions"
+        raise InvalidParameter(f"unbreakable is {pairs.tolist()!r:.60}: expected (u, 2) whole numbers, of {told}.")
+    return np.isin(rows[c.states] * mdp.n_actions + c.actions, pairs @ np.array([mdp.n_actions, 1]))

@@ -1,1 +1,0 @@
-"""A run as one page: HTML with everything in it, that opens from disk and fetches nothing."""

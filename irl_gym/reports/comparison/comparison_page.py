@@ -1,0 +1,239 @@
+"""compare.html: several runs side by side, of one environment or of several.
+
+Runs are called A, B, C, ... in the order they are given. Of the configurations only what differs is listed; learning curves are
+in one figure, as scores where the environments differ.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+from irl_gym.errors import InvalidParameter
+from irl_gym.judging import measures
+from irl_gym.judging.diagnoses.findings import told_answer
+from irl_gym.judging.measures import explained, shown
+from irl_gym.judging.scores import REFERENCES, agent_of, called, others
+from irl_gym.judging.shares import judged
+from irl_gym.reports.comparison.pooled import over_seeds
+from irl_gym.reports.comparison.ranked import learning, sentence
+from irl_gym.reports.comparison.shared_worlds import one_world, run_places, run_title
+from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.document import write_page
+from irl_gym.reports.page.panels import Panel
+from irl_gym.reports.page.scene import Scene
+from irl_gym.reports.page.sections import compared
+from irl_gym.reports.page.sections.asked import written
+from irl_gym.reports.page.sections.proof import finding
+from irl_gym.reports.page.sections.section import Section, specs
+from irl_gym.reports.page.sections.verdict import answer, how
+from irl_gym.runs.certificates import facts_in
+from irl_gym.runs.pooling import pools
+from irl_gym.runs.run import Run
+from irl_gym.written import counted, seconds, sentence_of
+
+SCRIPTS = ("theme.js", "figures.js")
+MOST_RUNS = 26
+NONE = "not there"
+"""In place of an empty cell: the run has no such number."""
+
+
+def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
+    """Write several runs as one page beside, then rename. The same runs make the same bytes.
+
+    Args:
+        runs: at least two, 26 at most.
+        path: of the file.
+
+    Raises:
+        InvalidParameter: fewer or more runs, or a folder of the file's own name.
+    """
+    if not 2 <= len(runs) <= MOST_RUNS:
+        raise InvalidParameter(f"runs has {len(runs)} of them: expected 2 to {MOST_RUNS} to put side by side.")
+    named = lettered(runs)
+    context, data = _page(named)
+    write_page(path, "compare.html", context, data, SCRIPTS)
+
+
+def lettered(runs: Sequence[Run]) -> dict[str, Run]:
+    """Runs by their letters."""
+    return {chr(ord("A") + i): run for i, run in enumerate(runs)}
+
+
+def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What the template shows, and the scripts."""
+    scenes = {letter: Contents(run).scene for letter, run in named.items()}
+    places, found = run_places(named), pools(named)
+    sections = [
+        _results(named),
+        over_seeds(found, places, same=one_world(named)),
+        learning(named),
+        _rewards(named, scenes),
+        _policies(scenes),
+        _differences(named),
+        _proofs(named),
+        _doctors(named),
+    ]
+    kept = [section for section in sections if section is not None]
+    facts = [(letter, f"{run_title(run.config, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
+    facts += [(letter, run.caution) for letter, run in named.items() if run.caution is not None]
+    told = {run.whose: [letter for letter, one in named.items() if one.whose == run.whose] for run in named.values()}
+    facts += [(", ".join(letters), whose) for whose, letters in told.items()]
+    context = {"title": f"{len(named)} runs side by side", "facts": facts, "sentence": sentence(named, found), "sections": kept}
+    return context, {"figures": specs(kept), "slider": None, "episodes": {}}
+
+
+def _results(named: Mapping[str, Run]) -> Section:
+    """One row a number, one column a run."""
+    places = run_places(named)
+    columns = [
+        {
+            "environment": places[letter],
+            **dict(_numbers(run.metrics, recomputed=run.recomputed)),
+            "time of all stages": _time(run),
+        }
+        for letter, run in named.items()
+    ]
+    keys = list(dict.fromkeys(key for column in columns for key in column))
+    rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
+    lead = [
+        "Every number is under the true reward of its own environment.",
+        *_explained([run.metrics for run in named.values()]),
+    ]
+    return _table("results", "Results", " ".join(map(sentence_of, lead)), named, rows)
+
+
+def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the measures are, where that is the same in all runs; each run's own page says all of it."""
+    each = []
+    for metrics in told:
+        found = [*shown(measures.POLICIES, [*metrics["policies"].values()]), *shown(measures.REWARDS, [metrics["reward"]])]
+        each.append(explained(found, metrics))
+    return [one for one in each[0] if all(one in other for other in each)]
+
+
+def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: list[list[str]]) -> Section:
+    shown = {"caption": title, "headings": ["", *(f"run {letter}" for letter in named)], "rows": rows}
+    return Section(name, title, lead, (), "compare", shown)
+
+
+def _time(run: Run) -> str:
+    """How long all stages took."""
+    return seconds(sum(record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"))
+
+
+def _numbers(metrics: Mapping[str, Any], *, recomputed: bool) -> Iterator[tuple[str, str]]:
+    """What the table of results says of a run's policies and reward."""
+    policies, reward = metrics["policies"], metrics["reward"]
+    told, agents = shown(measures.POLICIES, list(policies.values())), others(policies)
+    for one, name in product((one for one in told if one.relative), agents):
+        yield f"{one.heading}, {called(name)}", one.text(policies[name])
+    for name in agents:
+        yield f"{called(name)}, judged by the worse share", judged(policies, metrics.get("table"), name).brief
+    for one, name in product((one for one in told if not one.relative), (*agents, *REFERENCES)):
+        yield f"{one.heading}, {called(name)}", one.text(policies[name])
+    for name in (*agents, *REFERENCES):
+        yield f"how it came about, {called(name)}", how(policies[name])
+    yield from ((one.heading, one.text(reward)) for one in shown(measures.REWARDS, [reward]))
+    whose = "" if recomputed else ", as recorded"
+    yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
+    if policies[agent_of(policies)]["score"] is not None:
+        steps = metrics["training"].get("steps_to_0.99")
+        yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
+
+
+def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section:
+    """The learned rewards, and once each environment's true one."""
+    made: list[Panel] = []
+    places = run_places(named)
+    for letter, run in named.items():
+        scene = scenes[letter]
+        if scene is None:
+            section = compared.weights(run.learned)
+            made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
+        else:
+            made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))
+    lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
+    return Section("rewards", "Learned rewards", lead, made)
+
+
+def _policies(scenes: Mapping[str, Scene | None]) -> Section | None:
+    """The retrained agents, with what deviates shaded."""
+    made: list[Panel] = []
+    for letter, scene in scenes.items():
+        if scene is None:
+            continue
+        for panel in compared.policy_panels(scene):
+            if panel.name != "policy-expert":
+                made.append(replace(panel, name=f"policy-{letter}", title=f"Run {letter}"))
+    if not made:
+        return None
+    return Section("policies", "Retrained agents", "What each agent does; shaded is where it deviates from its expert.", made)
+
+
+def _differences(named: Mapping[str, Run]) -> Section:
+    """What differs between the configurations."""
+    flat = [dict(_leaves(run.config)) for run in named.values()]
+    keys = _entries(flat)
+    rows = [[key, *(_entry(one, key) for one in flat)] for key in keys if not _alike(key, flat)]
+    if not rows:
+        return Section("differences", "What differs", "The runs have the same configuration.")
+    told = (
+        f"{counted(len(rows), 'entry differs', 'entries differ')}; the other {len(keys) - len(rows)} are the same in all runs"
+    )
+    lead = f"Of the configuration {told}."
+    return _table("differences", "What differs", lead, named, rows)
+
+
+def _entries(flat: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names of all entries; one that is empty in one run and has parts in another is told by its parts."""
+    keys = list(dict.fromkeys(key for one in flat for key in one))
+    empty = {key for one in flat for key, value in one.items() if value in (None, {})}
+    return [key for key in keys if key not in empty or not any(other.startswith(f"{key}.") for other in keys)]
+
+
+def _entry(leaves: Mapping[str, Any], key: str) -> str:
+    """A value of a configuration, in words where it is none."""
+    if key not in leaves:
+        return NONE
+    return "none" if leaves[key] in (None, {}, []) else written(leaves[key])
+
+
+def _alike(key: str, flat: Sequence[Mapping[str, Any]]) -> bool:
+    return all(key in one and one[key] == flat[0].get(key) for one in flat)
+
+
+def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested objects with their dotted names."""
+    if not isinstance(content, Mapping) or not content:
+        yield prefix, content
+        return
+    for key, value in content.items():
+        yield from _leaves(value, f"{prefix}.{key}" if prefix else str(key))
+
+
+def _proofs(named: Mapping[str, Run]) -> Section:
+    """What each run's reward says of its expert, and what its learner proves."""
+    columns = [{one.label: one.sentence for part in facts_in(run.certificate) for one in part} for run in named.values()]
+    labels = dict.fromkeys(label for column in columns for label in column)
+    rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
+    recorded = ", ".join(letter for letter, run in named.items() if not run.recomputed)
+    lead = "What each run's reward says of its expert, and by the run's own record what its learner proves of its program."
+    lead += f" Of {recorded} all of it is the record." if recorded else ""
+    return _table("certificate", "Certificates", lead, named, rows)
+
+
+def _doctors(named: Mapping[str, Run]) -> Section:
+    """What the doctor says of each run."""
+    findings = []
+    answers: dict[str, list[str]] = {}
+    for letter, run in named.items():
+        said = told_answer(run.diagnosis) if run.diagnosis else "Not looked at, by the earlier version of irl_gym that made it."
+        answers.setdefault(said, []).append(letter)
+        for one in run.diagnosis["findings"] if run.diagnosis else ():
+            told = finding(one, run.worded, given=run.config.get("dataset") is not None)
+            findings.append({**told, "name": f"run {letter}: {told['name']}"})
+    lead = "What is to be said against each reward, and what to do about it. " if findings else ""
+    lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())
+    return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})

@@ -1,0 +1,120 @@
+"""The section of runs that differ in their seed alone: how good a method is over its seeds, and over environments."""
+
+from collections.abc import Mapping, Sequence
+
+from irl_gym.intervals import Interval
+from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, others, score_of
+from irl_gym.reports.comparison.shared_worlds import levels_of, levels_told
+from irl_gym.reports.page.panels import Panel
+from irl_gym.reports.page.sections.section import Section
+from irl_gym.reports.page.sections.training import curves
+from irl_gym.runs.pooling import Pool, over_environments
+from irl_gym.written import number, percent, with_ends
+
+TRIMMED = 4
+"""Seeds from which on an interquartile mean leaves some out."""
+
+
+def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) -> Section | None:
+    """The section; None where no two runs differ in their seed alone.
+
+    Args:
+        found: the pools.
+        places: what the environment of each run is called.
+        same: are all runs of one environment, so that their values can be drawn in one figure?
+    """
+    if not found:
+        return None
+    lead = (
+        "Runs that differ in their seed alone, taken together: interquartile means with 95 % intervals, which "
+        "resist outliers (Agarwal et al. 2021). Seeds that agree are too few to say how surely, and have no interval."
+    )
+    if min(len(pool.runs) for pool in found) < TRIMMED:
+        lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few is wide."
+    columns = [_column(pool, places) for pool in found]
+    keys = dict.fromkeys(key for column in columns for key in column)
+    rows = [[key, *(column.get(key, "not there") for column in columns)] for key in keys]
+    shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
+    lead += "".join(f" {_together(several, score)}" for several, score in over_environments(found))
+    drawn = [pool for pool in found if pool.curve is not None] if same else []
+    return Section("seeds", "Over seeds", lead, [_curves(drawn)] if drawn else [], "compare", shown)
+
+
+def called(pool: Pool) -> str:
+    """The runs of a pool by their letters."""
+    return f"runs {', '.join(sorted(pool.runs))}"
+
+
+def told(pool: Pool) -> str:
+    """A pool in one line."""
+    n = len(pool.runs)
+    if pool.score is None:
+        return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
+    means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
+    beside = [
+        f"; {name}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
+        for name in others(pool.policies)
+        if name != pool.agent
+    ]
+    return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}{''.join(beside)}"
+
+
+def returned(pool: Pool) -> str:
+    """The mean return of a pool's agents, and what there is to compare it with."""
+    random, expert = (number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
+    return f"mean return {with_ends(pool.mean_returns[pool.agent])} where random actions have {random}, the expert {expert}"
+
+
+def averaged(pool: Pool) -> str:
+    """What the mean of a pool is."""
+    return "mean" if len(pool.runs) < TRIMMED else "interquartile mean"
+
+
+def spoken(score: Interval | None) -> str:
+    """A score with its interval."""
+    return "none" if score is None else with_ends(score, score_of)
+
+
+def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
+    """What the table says of a pool."""
+    config, letter = pool.first.config, next(iter(pool.runs))
+    lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values()]
+    told = {
+        "environment": places[letter],
+        "learner": str((config.get("learner") or {}).get("type", "")),
+        "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
+    }
+    for name in others(pool.policies):
+        told |= _of_policy(pool, name)
+    ends = " and ".join(number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
+    return told | {
+        "mean return of random actions and of the expert": ends,
+        "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
+    }
+
+
+def _of_policy(pool: Pool, name: str) -> dict[str, str]:
+    """What the table says of the policies of one name."""
+    whose, scores = "the retrained agents" if name == RETRAINED else name, pool.scores_of(name)
+    ends = "none" if scores is None else " and ".join(map(score_of, (scores.min(), scores.max())))
+    return {
+        f"score of {whose} (95 %)": spoken(pool.score_of(name)),
+        f"mean return of {whose} (95 %)": with_ends(pool.mean_returns[name]),
+        f"{whose}, judged by the worse share": pool.judged_of(name).brief,
+        f"score of {whose}, worst and best seed": ends,
+    }
+
+
+def _together(several: Sequence[Pool], score: Interval) -> str:
+    letters = "; ".join(map(called, several))
+    return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, by what varies within each."
+
+
+def _curves(drawn: Sequence[Pool]) -> Panel:
+    """The learning curves of pools that have one."""
+    found = {called(pool): pool.curve for pool in drawn if pool.curve is not None}
+    series = {name: (steps, values[:, 0], (values[:, 1], values[:, 2])) for name, (steps, values) in found.items()}
+    levels = levels_of({called(pool): pool.runs for pool in drawn})
+    ends = "; ".join(f"{name} end at {number(values[-1])}" for name, (_, values, _) in series.items())
+    caption = f"Interquartile means with their 95 % intervals (shaded): {ends}; {levels_told(levels)}."
+    return Panel("seed-curves", "Discounted value over seeds", caption, curves(series, levels, "discounted value"), height=400)

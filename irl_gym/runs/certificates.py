@@ -1,0 +1,91 @@
+"""certificate.json: what a run's reward says of the expert, and what its learner proves of its program, each with its facts.
+
+    {"optimality": {fields, "facts": [...]}, or null where there is no table,    "proof": {fields, "facts": [...]}}
+Whoever reads a run recomputes the optimality from the run's table, expert and reward (`verified`); the proof is its record.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from irl_gym.facts import Fact, facts_of
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.files.metrics_schema import Certificate
+from irl_gym.files.run_folder import read_json
+from irl_gym.learners.base import IRLResult
+from irl_gym.mdp.optimality import Optimality, certify
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.sampling_error import ESTIMATED
+from irl_gym.tables.tabulation import Tabulation
+
+FREQUENT = Fact("judged", "the actions most frequent in its episodes")
+ESTIMATE = Fact("judged on", ESTIMATED, "open")
+
+
+def certificate_of(result: IRLResult, known: tuple[Tabulation, Any] | None, *, episodes: bool) -> dict[str, Any]:
+    """What certificate.json holds of a result.
+
+    Args:
+        result: of any learner.
+        known: the table, and the expert as the learner was given it; None where there is no table.
+        episodes: is the expert known by its episodes only? Then it may err.
+    """
+    proof = {**result.proof.to_json(), "facts": [one.to_json() for one in result.facts()]}
+    if known is None:
+        return {"optimality": None, "proof": proof}
+    table, expert = known
+    reward = result.reward.tabular(table.states) if isinstance(result.reward, LinearReward) else result.reward
+    found = certified(table, expert, reward, proof, episodes=episodes)
+    return {"optimality": optimality_told(found, table), "proof": proof}
+
+
+def certified(table: Tabulation, expert: Any, reward: TabularReward, proof: Mapping[str, Any], *, episodes: bool) -> Optimality:
+    """What a run's reward says of its expert.
+
+    Args:
+        table: the run's.
+        expert: as its learner was given it.
+        reward: in the table.
+        proof: as json holds it; rows that its program found unbreakable have no margin.
+        episodes: is the expert known by its episodes only? Then it may err.
+
+    Raises:
+        InvalidPolicy, InvalidReward, InvalidParameter: what does not belong together.
+    """
+    return certify(table.mdp, expert, reward, errs=episodes, unbreakable=proof.get("unbreakable_rows"))
+
+
+def optimality_told(found: Optimality, table: Tabulation) -> dict[str, Any]:
+    """The same as json holds it, with what a run knows besides: who is judged, and on which table."""
+    more = (FREQUENT,) if found.errs else ()
+    if not table.evidence.exact and found.sampling_error is None:
+        more += (ESTIMATE,)
+    first, *others = found.facts()
+    return {**found.to_json(), "facts": [one.to_json() for one in (first, *more, *others)]}
+
+
+def read_certificate(path: Path) -> dict[str, Any]:
+    """The content of certificate.json.
+
+    Raises:
+        DamagedFile: it is something else, such as that of an earlier version.
+    """
+    told = read_json(path, Certificate)
+    facts_in(told)
+    return told
+
+
+def facts_in(certificate: Mapping[str, Any]) -> tuple[tuple[Fact, ...], tuple[Fact, ...]]:
+    """The facts of a certificate's optimality, none without a table, and those of its proof.
+
+    Raises:
+        DamagedFile: some are no facts.
+    """
+    parts = (certificate["optimality"] or {"facts": []}, certificate["proof"])
+    of_reward, of_program = (facts_of(one.get("facts")) for one in parts)
+    return of_reward, of_program
+
+
+def claims_in(certificate: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a certificate says, by name: what a table decides is not a sampling learner's to say."""
+    return {key: one for key, one in {**certificate["proof"], **(certificate["optimality"] or {})}.items() if key != "facts"}

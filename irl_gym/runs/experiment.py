@@ -1,0 +1,208 @@
+"""What one run of the loop does: a frozen record, and its json."""
+
+import hashlib
+import json
+import math
+import pickle
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from irl_gym.agents.noise import checked_epsilon
+from irl_gym.agents.planners import Planner
+from irl_gym.checks import checked_number
+from irl_gym.demonstrations.endings import AfterEnd, checked_after_end
+from irl_gym.errors import InvalidParameter
+from irl_gym.learners.base import Learner
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.rewards import plain_json
+from irl_gym.mdp.tabular_mdp import check_discount
+from irl_gym.runs.named_parts import KNOWN, Reveals
+from irl_gym.tables.tabulate import By
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What one run of the loop does.
+
+    Raises:
+        InvalidDiscount: gamma outside (0, 1).
+        InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset, or an expert beside a dataset; two
+            ways to make a table; noise outside 0 to 1.
+    """
+
+    env_id: str | None
+    """A registered environment; `module:id` for one of another package; None for the one that the dataset was recorded in."""
+    gamma: float
+    """Discount, between 0 and 1."""
+    env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Given to `gymnasium.make`."""
+    start_seeds: Sequence[int] = ()
+    """Seeds of the layouts that resets draw from (MiniGrid); none for whatever resets draw."""
+    reveal: Reveals = KNOWN
+    """Hidden integers that the observation shall show, with their numbers of values; "known": those known to be hidden."""
+    table: By | None = None
+    """How a table is made; None for what is known of the environment, and enumeration where nothing is."""
+    bins: int | Sequence[int] | None = None
+    """Cells a coordinate, to make a table of an environment with continuous states; None for none."""
+    samples: int = 0
+    """Points drawn in each cell, whose steps are counted; 0 for the step from its centre, shared between its neighbours."""
+    dataset: str | None = None
+    """A Minari dataset of the expert's episodes, in place of an expert."""
+    dataset_root: str | None = None
+    """Minari's root folder; None for the one in force."""
+    trust_dataset: bool = False
+    """Import and call whatever the dataset says it was recorded in; else that has to be registered here."""
+    after_end: AfterEnd = "refuse"
+    """What to do with an episode of the dataset that goes on after its end: "refuse" it, or "cut" it there."""
+    expert: Planner | None = None
+    """Plans or learns under the true reward; None for ValueIteration where there is a table, else SB3."""
+    epsilon: float = 0.0
+    """Probability of a random action in place of the expert's; above 0 a learner sees only what the episodes show."""
+    episodes: int = 500
+    """Demonstrations recorded."""
+    learner: Learner = field(default_factory=lambda: FiniteLP(report_lambda_0=True))
+    """Recovers the reward: FiniteLP, FeatureLP or TrajectoryLP."""
+    inner: Planner | None = None
+    """Solves for each reward that TrajectoryLP tries; None for ValueIteration where there is a table, else SB3."""
+    shaping: bool = True
+    """Retrain on the expected advantage under the learned reward, clipped; else on the reward as it is. It needs a table."""
+    retrain: Planner | None = None
+    """Plans or learns under the learned reward; None for SB3 with settings that suit that reward."""
+    num_envs: int | None = None
+    """Copies of the environment that SB3 trains on; None for 64 of a table, 8 of a world that is stepped."""
+    eval_episodes: int = 200
+    """Episodes for the mean returns."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        check_discount(self.gamma)
+        for name in ("env_id", "dataset"):
+            if not isinstance(getattr(self, name), str | None):
+                raise InvalidParameter(f"{name} is {getattr(self, name)!r:.80}: expected a text, or None.")
+        if (self.env_id or self.dataset) is None:
+            raise InvalidParameter(
+                "env_id and dataset are None: expected an environment, or a dataset that was recorded in one."
+            )
+        if self.dataset is not None and self.env_id is None and (self.start_seeds or self.reveal not in ({}, KNOWN)):
+            raise InvalidParameter(
+                f"start_seeds is {self.start_seeds!r} and reveal {self.reveal!r}, but the environment is the dataset's: "
+                "expected neither. Name env_id, or leave them out."
+            )
+        checked_epsilon(self.epsilon)
+        checked_after_end(self.after_end)
+        if self.dataset is not None and (self.expert is not None or self.epsilon):
+            raise InvalidParameter(
+                f"dataset is {self.dataset!r}, but expert is {self.expert} and epsilon {self.epsilon}: expected the episodes "
+                "as they are. Leave expert and epsilon out."
+            )
+        if self.table is not None and (self.bins is not None or not isinstance(self.table, By)):
+            raise InvalidParameter(
+                f"table is {self.table!r} and bins {self.bins}: expected Enumeration(...) or Interaction(...) for discrete "
+                "states, or bins for continuous ones. Leave one out."
+            )
+        checked_number("samples", self.samples, "a whole number of at least 0", least=0, whole=True)
+        for name in ("episodes", "num_envs", "eval_episodes"):
+            if name != "num_envs" or self.num_envs is not None:
+                checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
+        expected = "a whole number from 0 to 2^32 - 1, as Stable-Baselines3 takes"
+        checked_number("seed", self.seed, expected, least=0, below=2**32, whole=True)
+        for name in ("episodes", "num_envs", "eval_episodes", "samples", "seed"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
+
+    @property
+    def from_episodes(self) -> bool:
+        """Does a learner of tables see only what the episodes show, not the expert's whole policy?"""
+        return self.dataset is not None or self.epsilon > 0
+
+    @property
+    def name(self) -> str:
+        """A folder's name that no other experiment has: the environment and a digest of everything."""
+        digest = hashlib.sha256(json.dumps(self.to_json(), sort_keys=True).encode()).hexdigest()[:8]
+        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id or self.dataset or '')}-{digest}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The configuration as json; planners, learners and features with their class's name, large arrays by their digest.
+
+        Fields that came later are left out at their default: so a run of an earlier version is known again.
+        """
+        told = {name: as_config(getattr(self, name)) for name in self.__dataclass_fields__}
+        return {name: value for name, value in told.items() if name not in LATER or value != LATER[name]}
+
+
+LATER = {"after_end": "refuse", "trust_dataset": False}
+"""Fields that earlier versions had not, and what these did."""
+MOST_LISTED = 64
+"""Numbers of an array that a configuration lists."""
+
+
+def as_config(value: Any) -> Any:
+    """What json holds of a part of an experiment: of a large array, or an object without a text of its own, a digest."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {
+            "type": type(value).__name__,
+            **{one.name: as_config(getattr(value, one.name)) for one in fields(value) if one.init},
+        }
+    if isinstance(value, Mapping):
+        return {str(key): as_config(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_config(one) for one in value]
+    if isinstance(value, set | frozenset):
+        return [as_config(one) for one in sorted(value, key=repr)]
+    if isinstance(value, np.ndarray):
+        if value.size <= MOST_LISTED:
+            return as_config(value.tolist())
+        content = None if value.dtype.hasobject else np.ascontiguousarray(value).tobytes()
+        return {"array": list(value.shape), "sha256": _digest(value.tolist()) if content is None else _sha256(content)}
+    if callable(value):
+        return getattr(value, "__qualname__", type(value).__name__)
+    plain = json.loads(json.dumps(value, default=plain_json))
+    if isinstance(plain, float) and not math.isfinite(plain):
+        return {"float": str(plain)}
+    if isinstance(plain, str) and not isinstance(value, str) and " at 0x" in plain:  # where it is in memory
+        return {"object": f"{type(value).__module__}.{type(value).__qualname__}", "sha256": _digest(value)}
+    return plain
+
+
+def _digest(value: Any) -> str | None:
+    """Of an object's pickle; None where it refuses to be pickled."""
+    try:
+        return _sha256(pickle.dumps(value, protocol=4))
+    except Exception:  # whatever its class raises
+        return None
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
+    """Arguments of an environment given as text: `name=value` pairs, each value json or plain text; or one json object.
+
+    `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
+
+    Raises:
+        InvalidParameter: neither.
+    """
+    if len(parts) == 1 and parts[0].lstrip().startswith("{"):
+        try:
+            return json.loads(parts[0])
+        except (ValueError, RecursionError) as error:
+            raise InvalidParameter(f"env-kwargs is {parts[0]!r:.200}, not json ({error}): expected an object.") from error
+    found: dict[str, Any] = {}
+    for part in parts:
+        name, equals, text = part.partition("=")
+        if not equals or not name.isidentifier():
+            raise InvalidParameter(f"env-kwargs has {part!r}: expected name=value, such as map_name=8x8.")
+        try:
+            found[name] = json.loads(text)
+        except ValueError:
+            found[name] = text
+        except RecursionError as error:
+            raise InvalidParameter(f"env-kwargs has {part!r:.40}, nested too deeply: expected plain json, or text.") from error
+    return found

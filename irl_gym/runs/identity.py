@@ -1,0 +1,169 @@
+"""A folder is claimed for a run: what identifies the run is compared, and two files say who wrote it and where it takes place.
+
+run.json          the format, the version of irl_gym, and the command: no part of what identifies the run
+environment.json  its id, the observation space, the names of the actions and what it was made with (large arrays by a
+                  digest): so that a run can be read where the environment is not installed
+"""
+
+import importlib.metadata
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from minari.serialization import serialize_space
+
+from irl_gym.errors import RunConflict, RunNewer
+from irl_gym.files.run_folder import (
+    NOT_THE_SAME,
+    RECORDS,
+    START,
+    RunFolder,
+    changed,
+    digests,
+    is_empty,
+    read_json,
+    read_record,
+    write_json,
+    write_record,
+)
+from irl_gym.spaces.names import action_names
+from irl_gym.tables.table_files import TABLE, UNDER_WAY
+
+NUMBER = 1
+FORMAT = f"irl_gym.Run/{NUMBER}"
+FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
+"""Stages of every version, after the table."""
+STAGES = (*FIRST, "record", "ambiguity", "report")
+"""All stages after the table."""
+VERSION, ENVIRONMENT = "run.json", "environment.json"
+PROGRAM = ["python", "scripts/recover_and_retrain.py"]
+"""How a run's command begins, unless another program started it."""
+AGAIN = "runs/again"
+"""The folder of a run that is made again."""
+
+
+def claim(path: Path, config: dict[str, Any]) -> None:
+    """Refuse a folder of another run before any work, but take over one in which no stage was finished, without its table.
+
+    Raises:
+        RunConflict: it holds another run, files that are no run at all, or a file that is not the one that the run left.
+        RunNewer: it holds a run of a newer version.
+    """
+    if not path.exists() or is_empty(path):
+        return
+    if (path / VERSION).exists():
+        try:
+            told = read_json(path / VERSION)
+        except (OSError, ValueError) as error:
+            raise RunConflict(f"{path / VERSION} cannot be read ({error}): expected a run's. Delete that file.") from error
+        check_format(path, told)
+    known = path / "config.json"
+    before = known.read_bytes() if known.exists() else None
+    RunFolder(path, config)
+    if before not in (None, known.read_bytes()):
+        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT, f"{RECORDS}/{START}.json"):
+            (path / name).unlink(missing_ok=True)
+    recorded = (read_record(path, START) or {}).get("sha256", {})
+    other = changed(path, {"sha256": {name: one for name, one in recorded.items() if name in (VERSION, ENVIRONMENT)}})
+    if other is not None:
+        raise RunConflict(f"{path / other} {NOT_THE_SAME}. Delete it, and it is written again.")
+
+
+def check_format(path: Path, told: Mapping[str, Any]) -> None:
+    """Check the content of a folder's run.json; empty for a run of a version that wrote none.
+
+    Raises:
+        RunNewer: a newer version wrote it.
+        RunConflict: it is no run's.
+    """
+    found = told.get("format")
+    if not told or found == FORMAT:
+        return
+    number = re.fullmatch(r"irl_gym\.Run/([0-9]{1,9})", str(found))
+    if number is None or int(number[1]) <= NUMBER:
+        raise RunConflict(
+            f"{path / VERSION} has format {found!r}: expected {FORMAT!r}. If irl_gym made the run, delete that file."
+        )
+    raise RunNewer(
+        f"{path} has format {found!r}, written by irl_gym {told.get('irl_gym')}: expected {FORMAT!r}, which is what irl_gym "
+        f"{_version()} reads. Upgrade irl_gym."
+    )
+
+
+def write_version(path: Path, command: Sequence[str] | None) -> None:
+    """Write run.json, unless it stands already: a run that continues keeps the command of its start."""
+    if not (path / VERSION).exists():
+        write_json(
+            path / VERSION, {"format": FORMAT, "irl_gym": _version(), "command": None if command is None else [*command]}
+        )
+
+
+def write_environment(path: Path, env: gym.Env, env_id: str | None, kwargs: Any = None) -> None:
+    """Write environment.json, unless it stands already; `kwargs`, what it was made with as json, are for who reads the file."""
+    if not (path / ENVIRONMENT).exists():
+        observations = serialize_space(env.observation_space)  # text, as Minari keeps it: bounds may be infinite
+        told = {"id": env_id, "observations": observations, "actions": [*action_names(env)], "kwargs": kwargs}
+        write_json(path / ENVIRONMENT, told)
+
+
+def record_start(path: Path, *, table_kept: bool) -> None:
+    """Record the digests of what a run begins with. The table has to be the one that its stages were made from.
+
+    Args:
+        path: the folder.
+        table_kept: the table was there; else it has just been made.
+
+    Raises:
+        RunConflict: it is another table.
+    """
+    names = [name for name in ("config.json", VERSION, ENVIRONMENT, TABLE) if (path / name).exists()]
+    now = {"files": names, "sha256": digests(path, names)}
+    before = read_record(path, START) or {}
+    if changed(path, {"sha256": {name: one for name, one in before.get("sha256", {}).items() if name == TABLE}}):
+        told = (
+            f"{NOT_THE_SAME}. Delete it, and it is made again"
+            if table_kept
+            else "was made again, and is another than the run's stages were made from: expected the same bytes. Was the run "
+            "begun by another version of irl_gym? Choose another --out"
+        )
+        raise RunConflict(f"{path / TABLE} {told}.")
+    if before != now:
+        write_record(path, START, now)
+
+
+def into_folder(command: Sequence[str], folder: str = AGAIN) -> list[str]:
+    """The command with another --out.
+
+    The default makes the run again: in the run's own folder everything is there already, and would be kept. A run that was
+    moved or copied is continued where it is now: the folder that the command names may hold another one.
+    """
+    kept: list[str] = []
+    skipped = False
+    for word in map(str, command):
+        flag = flag_of(word)
+        if not skipped and flag != "--out":
+            kept.append(word)
+        skipped = flag == "--out" and "=" not in word
+    return [*kept, "--out", folder]
+
+
+def ours(command: Sequence[str]) -> bool:
+    """Is a command that a file names one of this library's scripts? Any other could be anything, and is said to be."""
+    return list(map(str, command[:2])) == PROGRAM
+
+
+def flag_of(word: str) -> str:
+    """The flag that a word of a command gives, as --help spells it; tyro takes --env_id for --env-id."""
+    return word.partition("=")[0].replace("_", "-") if word.startswith("--") else ""
+
+
+def shell_command(command: Sequence[str] | None) -> str | None:
+    """A command as a shell reads it; None for None."""
+    return None if command is None else shlex.join(command)
+
+
+def _version() -> str:
+    return importlib.metadata.version("irl_gym")

@@ -1,0 +1,30 @@
+"""What a run found, in one record: what `recover_and_retrain` returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a run found, as it stands in the run's folder."""
+
+    out: Path
+    """The folder."""
+    metrics: Mapping[str, Any]
+    """The content of metrics.json: policies, score_reason (None where there is a score), expert_value (its 95 % interval),
+    reward, training, demonstrations, and table, None where there is none."""
+    certificate: Mapping[str, Any]
+    """The content of certificate.json."""
+    stages: Mapping[str, Mapping[str, Any]]
+    """The record of each stage: wall seconds in the run that finished it, environment steps, what the solver did."""
+    config: Mapping[str, Any]
+    """The content of config.json: the experiment."""
+    shown: Mapping[str, int]
+    """Hidden integers that the observation was made to show, with their numbers of values."""
+
+    @property
+    def page(self) -> Path:
+        """The page that shows it all."""
+        return self.out / "report.html"

@@ -1,0 +1,69 @@
+"""What scripts say in a terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from irl_gym.commands.terminal import DEFECT, exit_code, print_error, stage_bars
+from irl_gym.errors import RunIncomplete
+from irl_gym.facts import harmless
+
+
+def shown(*, terminal):
+    said = io.StringIO()
+    with stage_bars(Console(file=said, force_terminal=terminal, width=100)) as show:
+        for share in (0.0, 0.5, 1.0):
+            show("expert", share)
+        show("reward", 0.25)
+    return said.getvalue()
+
+
+def test_each_stage_has_one_bar_on_a_terminal():
+    last = shown(terminal=True).rpartition("\x1b[2K")[2].splitlines()
+    bars = [line for line in last if " %" in line]
+    assert len(bars) == 2 and "expert" in bars[0] and "100 %" in bars[0] and "reward" in bars[1] and " 25 %" in bars[1]
+
+
+def test_no_bar_is_drawn_where_there_is_no_terminal():
+    assert shown(terminal=False).strip() == ""
+
+
+def test_bars_end_when_the_work_fails():
+    console = Console(file=io.StringIO(), force_terminal=True)
+    with pytest.raises(KeyboardInterrupt), stage_bars(console) as show:
+        show("expert", 0.5)
+        raise KeyboardInterrupt
+    with stage_bars(console) as show:  # a second display on one console would be refused
+        show("expert", 1.0)
+
+
+@pytest.mark.parametrize("error", [RunIncomplete(f"{'long ' * 60}[bold]end"), FileNotFoundError("no such folder")])
+def test_an_error_is_one_line_on_standard_error(capsys, error):
+    print_error(error)
+    said = capsys.readouterr()
+    assert said.out == "" and said.err == f"{type(error).__name__}: {error}\n"
+
+
+def test_an_error_shows_what_a_terminal_would_obey_and_does_not_send_it(capsys):
+    print_error(RunIncomplete("gamma \x1b]0;title\x07\x1b[31m \x9b31m \u202e \ud800\nexpected é"))
+    said = capsys.readouterr().err
+    assert not set("\x1b\x07\x9b\u202e\ud800") & set(said) and "\\x1b]0;title\\x07" in said and "\nexpected é" in said
+
+
+def test_whose_defect_may_be_is_said(capsys):
+    def broken():
+        raise ZeroDivisionError("\x1b[31mof what")
+
+    assert exit_code(broken, others="the environment") == DEFECT == 70
+    said = capsys.readouterr().err
+    told = "This is a defect of irl_gym or of the environment, not of your files: ZeroDivisionError: \\x1b[31mof what. Please"
+    assert said.startswith(told) and "Traceback (most recent call last)" in said and "in broken" in said
+
+
+def test_a_script_without_a_defect_exits_as_it_says():
+    assert exit_code(lambda: 2) == 2
+
+
+def test_a_plain_text_is_shown_as_it_is():
+    assert harmless("a b\nc é 状態 [bold]") == "a b\nc é 状態 [bold]"

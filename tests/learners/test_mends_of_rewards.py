@@ -1,0 +1,243 @@
+"""The mends that errors of learners, of sets of rewards and of distances name are executed, and serve."""
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import gymnasium
+import numpy as np
+import pytest
+from enumeration_envs import Shows
+from gymnasium import spaces
+from gymnasium.wrappers import FlattenObservation
+from judging.distances.samples import CONTINUING, ENDING, drawn, function, rewards_of
+from mended import SHOWN, mends, told, unsaid
+from models import random_model, ring
+from patients import partly_contradicted
+
+import irl_gym
+from irl_gym.agents.experts import Acting
+from irl_gym.demonstrations.imports import from_arrays
+from irl_gym.environments.generative import GenerativeModel
+from irl_gym.features.bases import RadialBasis
+from irl_gym.features.feature_maps import Functions, OneHot
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.judging.ambiguity.lambda_path import lambda_path
+from irl_gym.judging.ambiguity.uniqueness import optimal_face
+from irl_gym.judging.ambiguity.widths import feasible_widths
+from irl_gym.judging.distances import TableModel, Transitions, epic, sampled_dard, sampled_pearson, sampled_starc, starc
+from irl_gym.judging.distances.bounds import epic_bound
+from irl_gym.learners.linear_programs.estimates import usable
+from irl_gym.learners.linear_programs.feature import FeatureLP
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.episodes import Episode, collect
+from irl_gym.mdp.planning.dynamic_programming import policy_iteration
+from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.killable import called, within
+from irl_gym.spaces.states import StateIndex
+
+pytestmark = pytest.mark.usefixtures("unchecked")
+MODEL, SAME, SWAPPING = random_model(1, S=5), ring([[1, 1], [0, 0]]), ring([[1, 0], [0, 1]])
+WALLS, FIRST = ring([[1, 1, 0], [1, 1, 0]]), np.array([0, 0])
+PARTLY = np.where(np.arange(5)[:, None] > 2, np.nan, np.eye(3)[MODEL.expert])
+HALF = np.array([[1.0, 0.0], [np.nan, np.nan]])
+CONTRADICTED, NEAR = partly_contradicted(), Functions(lambda x: (x[:, :1] < 0.2).astype(float), 1)
+UNKNOWN_LAST = np.array([[1.0, 0.0]] * 4 + [[np.nan] * 2])
+STEPS = {"reward_on": "state-action"}
+R, S = rewards_of(CONTINUING)
+
+
+def fit(mdp=MODEL.mdp, expert=MODEL.expert, visits=None, **how):
+    return FiniteLP(**how).fit(mdp, expert, visits=visits)
+
+
+def on_features(features, S_0, mdp, expert):
+    return FeatureLP(features, S_0=S_0).fit(mdp, expert)
+
+
+def broken_off(asked):
+    return usable([Episode(np.arange(4), np.zeros(3, int), np.zeros(3), False, True)] * 2, asked, 5)
+
+
+def on_model(features, S_0=5):
+    env = gymnasium.make("irl_gym_envs:irl_gym/ContinuousGridWorld-v0")
+    upwards = Acting.of(lambda seen: int(seen[0] <= seen[1]), env)
+    return FeatureLP(features, S_0=S_0, horizon=3, samples=4).fit(GenerativeModel(env, 0.9), upwards)
+
+
+def one_step(**more):
+    return usable(from_arrays([0, 4], [1, 1], lengths=[1, 1], space=spaces.Discrete(16), n_actions=4, **more), 5, None)
+
+
+def widths(**how):
+    return feasible_widths(MODEL.mdp, MODEL.expert, **how)
+
+
+def path(expert=MODEL.expert, **how):
+    return lambda_path(MODEL.mdp, expert, **how)
+
+
+def dard(first=R, second=S, n=1000, replicates=8, transitions=None, model=None):
+    transitions, rng = transitions or drawn(CONTINUING, 0, n)[0], np.random.default_rng(0)
+    return sampled_dard(function(first), function(second), transitions, gamma=0.9, model=model or TableModel(CONTINUING.mdp),
+                        actions=np.arange(3), replicates=replicates, rng=rng)  # fmt: skip
+
+
+def played(policy):
+    transitions, _, rng = drawn(CONTINUING, 0, 50)
+    return sampled_starc(function(R), function(S), transitions, gamma=0.9, model=TableModel(CONTINUING.mdp), policy=policy,
+                         horizon=3, rng=rng)  # fmt: skip
+
+
+def of_parts(wrapper=lambda env: env):
+    """DARD of an environment whose observations have parts."""
+    env = wrapper(Shows(*SHOWN["a tuple with a float"]))
+    transitions = Transitions.from_episodes(
+        collect(env, Acting.of(lambda seen: int(np.sum(seen[0])) % 2, env), 3, max_episode_steps=9)
+    )
+
+    def pays(observations, actions, following):
+        return following[:, 0] + actions
+
+    return sampled_dard(pays, lambda *step: pays(*step) ** 2, transitions, gamma=0.9, actions=np.arange(2),
+                        model=lambda here, *_: (here, np.zeros(len(here), bool)), rng=np.random.default_rng(0))  # fmt: skip
+
+
+def coverage(make, model=ENDING):
+    weights = np.ones((8, 3))
+    return epic(model.mdp, *rewards_of(model), coverage=None if make is None else make(weights))
+
+
+def first_parts(batch, actions=2, **more):
+    return Transitions(batch, np.zeros(actions, int), np.arange(actions), **more)
+
+
+def hurried(limit):
+    Deadline.after(limit).check()
+    return True
+
+
+def in_child(limit, code):
+    with within(Deadline.after(limit)):
+        return code is None or called(1e18, os._exit, code)
+
+
+def pearson(groups):
+    return sampled_pearson(function(R), function(S), first_parts(np.arange(8), 8, groups=groups), None)
+
+
+AGENT = SimpleNamespace(predict=lambda observations: (np.zeros(len(observations), int), None))
+AGAINST = dict(enumerate(-MODEL.R))
+AT_ONE, FEW = {3: 1.0}, {s: AGAINST[s] for s in range(3)}
+ACTING = ~ENDING.mdp.terminal[:, None]
+EVEN = ACTING / (ACTING.sum() * 3) * np.ones((8, 3))
+ASIDE = TabularMDP.from_dense(
+    np.array([[[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], [[0, 0, 0], [0, 0, 0]]]) * 1.0, 0.9, np.eye(3)[0]
+)
+CASES = [
+    # learners
+    ("Give the next observations when they are imported.",
+     one_step, lambda: one_step(next_observations=[4, 8])),
+    ("Ask for a shorter horizon, such as 3.", lambda: broken_off(asked=5), lambda: broken_off(asked=3)),
+    ("Choose a larger S_0.",
+     lambda: on_features(OneHot(2), [1], ring([[1, 0], [0, 0]]), FIRST),
+     lambda: on_features(OneHot(2), None, ring([[1, 0], [0, 0]]), FIRST)),
+    ("Choose a larger S_0 or other features.",
+     lambda: on_model(NEAR, [[0.9, 0.9]]),
+     lambda: on_model(NEAR, 40) and on_model(RadialBasis.grid([0, 0], [1, 1], 2))),
+    ("Where nothing is known, the expert's row is NaN.",
+     lambda: fit(visits=[1, 1, 1, 0, 0]), lambda: fit(expert=PARTLY, visits=[1, 1, 1, 0, 0])),
+    ('Use margin_cap="auto", which leaves such rows out.',
+     lambda: fit(WALLS, FIRST, margin_cap=None), lambda: fit(WALLS, FIRST, margin_cap="auto")),
+    ('every reward on states makes it optimal. Use reward_on="state-action".',
+     lambda: fit(SAME, FIRST), lambda: fit(SAME, FIRST, **STEPS)),
+    ('Is the policy optimal for any reward at all? Use reward_on="state-action".',
+     lambda: fit(SWAPPING, FIRST), lambda: fit(SWAPPING, FIRST, **STEPS)),
+    ('every reward makes it optimal. Use reward_on="state-action".',
+     lambda: fit(SAME, HALF), lambda: fit(SAME, HALF, **STEPS)),
+    ("More demonstrations may tell.",
+     lambda: fit(CONTRADICTED, UNKNOWN_LAST), lambda: fit(CONTRADICTED, np.zeros(5, int))),
+    ('Use reward_on="state-action".',
+     lambda: fit(CONTRADICTED, UNKNOWN_LAST), lambda: fit(CONTRADICTED, UNKNOWN_LAST, **STEPS)),
+    ('expected unvisited="free", or l1 as a number.',
+     lambda: fit(expert=PARTLY, l1="auto"),
+     lambda: fit(expert=PARTLY, l1="auto", unvisited="free") and fit(expert=PARTLY, l1=0.01)),
+    # time
+    ("raise time_limit, or choose the other solver.", lambda: hurried(1e-9), lambda: hurried(60.0)),
+    ("raise time_limit, or give most_pieces.", lambda: path(time_limit=1e-9), lambda: path(time_limit=60.0, most_pieces=2)),
+    ("Is there enough memory? Without time_limit the first solver works in this process, and is not ended.",
+     lambda: in_child(60.0, 3), lambda: in_child(None, None)),
+    # sets of rewards
+    ("For one that is not the program is another, without a path here: use FiniteLP(l1=...) at a few prices.",
+     lambda: path(PARTLY), lambda: [fit(expert=PARTLY, l1=l1) for l1 in (0.01, 0.1)]),
+    ("`feasible_widths` takes such an expert.",
+     lambda: optimal_face(MODEL.mdp, PARTLY), lambda: feasible_widths(MODEL.mdp, PARTLY)),
+    ("Use margin=None,",
+     lambda: widths(pinned=dict.fromkeys(range(5), 0.5)), lambda: widths(pinned=dict.fromkeys(range(5), 0.5), margin=None)),
+    ("leave a pin out,", lambda: widths(pinned=dict.fromkeys(range(5), 0.5)), lambda: widths(pinned={0: 0.5})),
+    ("or raise r_max.", lambda: widths(pinned=AT_ONE), lambda: widths(pinned=AT_ONE, r_max=100)),
+    ("Leave a pin out,", lambda: widths(pinned=AGAINST, margin=None), lambda: widths(pinned={0: 1.0}, margin=None)),
+    ("or raise r_max.", lambda: widths(pinned=FEW, margin=None), lambda: widths(pinned=FEW, margin=None, r_max=100)),
+    ("Lower it,", lambda: widths(margin=0.9), lambda: widths(margin=1e-3)),
+    ("or raise r_max.", lambda: widths(margin=0.9), lambda: widths(margin=0.9, r_max=1e3)),
+    ("Raise r_max.", lambda: widths(pinned={0: 2.0}), lambda: widths(pinned={0: 2.0}, r_max=4.0, margin=None)),
+    ("no policy reaches state 1, so its reward is free. Drop it.",
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), pinned={1: 0.5}), lambda: feasible_widths(ASIDE, np.zeros(3, int))),
+    ("state 2 is terminal, no step is taken there. Drop it.",
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), pinned={(2, 0): 0.5}, **STEPS),
+     lambda: feasible_widths(ASIDE, np.zeros(3, int), **STEPS)),
+    ("values overflow. Scale it.", lambda: policy_iteration(MODEL.mdp, np.full((5, 3), 1e308)),
+     lambda: policy_iteration(MODEL.mdp, np.ones((5, 3)))),
+    # distances
+    ("Let it follow itself.",
+     lambda: epic_bound(ENDING.mdp, *rewards_of(ENDING)),
+     lambda: epic_bound(following_itself(ENDING), *rewards_of(ENDING))),
+    ("The reward is zero, constant or only a potential, or the coverage too narrow. Of rewards in a table, `starc` has a place "
+     "for it.",
+     lambda: epic(CONTINUING.mdp, R, 0 * R), lambda: starc(CONTINUING.mdp, R, 0 * R) > 0),
+    ("Give weight to states that act,", lambda: coverage(np.zeros_like), lambda: coverage(lambda weights: EVEN) > 0),
+    ("or pass None for all of them.", lambda: coverage(np.zeros_like), lambda: coverage(None) > 0),
+    ("Pass None for uniform over the others.", lambda: coverage(lambda weights: weights / 24), lambda: coverage(None) > 0),
+    ("Divide by the sum.",
+     lambda: coverage(lambda weights: weights, CONTINUING),
+     lambda: coverage(lambda weights: weights / weights.sum(), CONTINUING) > 0),
+    ("The reward is constant or only a potential, or drowned in the noise of the draws. Raise `replicates`,",
+     lambda: dard(R, S, 2, 2), lambda: dard(R, S, 2, 300)),
+    ("or the number of transitions.", lambda: dard(R, S, 2, 2), lambda: dard(R, S, 1000, 2)),
+    ("Give more episodes;", lambda: pearson(np.zeros(8)), lambda: pearson(np.arange(8) // 4)),
+    ("or, without it, groups=None for transitions in order.", lambda: pearson(np.zeros(8)), lambda: pearson(None)),
+    ("pass its `.reward`.", lambda: epic(MODEL.mdp, fit(), fit()), lambda: epic(MODEL.mdp, fit().reward, fit().reward) < 1e-6),
+    ("Pass `reward.tabular(states)`.",
+     lambda: epic(MODEL.mdp, LinearReward(np.arange(5), OneHot(5)), MODEL.R),
+     lambda: epic(MODEL.mdp, LinearReward(np.arange(5), OneHot(5)).tabular(StateIndex(spaces.Discrete(5))), MODEL.R) > 0),
+    ("Of SB3's predict take the first part: `lambda observations, rng: agent.predict(observations)[0]`.",
+     lambda: played(lambda observations, rng: AGENT.predict(observations)),
+     lambda: played(eval(mends(told(played, lambda observations, rng: AGENT.predict(observations)))[0], {"agent": AGENT}))),
+    ("Flatten them, for example with `gymnasium.wrappers.FlattenObservation`.", of_parts, lambda: of_parts(FlattenObservation)),
+    ("Of shape (2, 1) it is `terminated.ravel()`.",
+     lambda: first_parts(np.zeros(2), terminated=np.zeros((2, 1))),
+     lambda: first_parts(np.zeros(2), terminated=np.zeros((2, 1)).ravel())),
+    ("Stack a list with `np.array`.", lambda: first_parts([0, 1]), lambda: first_parts(np.array([0, 1]))),
+]  # fmt: skip
+
+
+def following_itself(model):
+    P = model.P.copy()
+    P[model.mdp.terminal] = np.eye(8)[model.mdp.terminal][:, None]
+    return TabularMDP.from_dense(P, 0.9, model.mdp.d0)
+
+
+@pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])
+def test_a_mend_that_an_error_about_rewards_names_serves(says, breaks, mended):
+    assert says in told(breaks) and mended()
+
+
+def test_every_mend_that_an_error_about_rewards_names_is_executed():
+    root = Path(irl_gym.__file__).parent
+    files = [
+        one.relative_to(root)
+        for folder in ("learners", "judging/ambiguity", "judging/distances")
+        for one in (root / folder).rglob("*.py")
+    ]
+    assert not unsaid(CASES, *files, "killable.py", "warm_lp.py", "linear_program.py", "solvers.py", "deadline.py", "howard.py")

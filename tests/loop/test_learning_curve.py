@@ -1,0 +1,52 @@
+"""Glances: an agent is judged again when it was updated, and only then."""
+
+from types import SimpleNamespace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from irl_gym.loop.learning_curve import Glances
+from irl_gym.loop.table_world import TableWorld
+from irl_gym.loop.worlds import SteppedWorld
+from irl_gym.tables.tabulate import tabulate
+
+
+class Counting:
+    """A policy that always goes the same way and counts how often it is asked; its model has had no update."""
+
+    def __init__(self):
+        self.model, self.asked = SimpleNamespace(_n_updates=0), 0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.asked += 1
+        return np.zeros(np.shape(observation)[:1], np.int64), state
+
+
+def stepped():
+    return SteppedWorld(gym.make("CartPole-v1", max_episode_steps=5), 0.9, 2, 20, 0)
+
+
+def tabular():
+    env = gym.make("FrozenLake-v1")
+    return TableWorld(env, tabulate(env, gamma=0.9, check_steps=0), 8, 0)
+
+
+@pytest.mark.parametrize("world", [stepped, tabular])
+def test_an_agent_is_judged_again_only_after_an_update(world):
+    policy, glances = Counting(), Glances(world(), lambda steps, policy: None)
+    asked = []
+    for steps, updates in ((0, 0), (64, 0), (128, 4)):
+        policy.model._n_updates = updates
+        glances.see(steps, policy)
+        asked.append(policy.asked)
+    assert asked[0] == asked[1] and asked[2] == 2 * asked[0]
+
+
+@pytest.mark.parametrize("world", [stepped, tabular])
+def test_a_curve_has_a_point_for_each_look_and_the_same_for_the_same_agent(world):
+    policy, glances = Counting(), Glances(world(), lambda steps, policy: None)
+    for steps in (0, 64, 128):
+        glances.see(steps, policy)
+    curve = glances.curve()
+    assert len(set(curve.value)) == 1 and list(curve.steps) == [0, 64, 128]

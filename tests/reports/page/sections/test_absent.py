@@ -1,0 +1,39 @@
+"""Sections that lack what they need: in their place stands why, or nothing where nothing is missed."""
+
+from dataclasses import replace
+
+import pytest
+from reports.page.made_runs import NO_CURVE, stepped_run, table_run
+
+from irl_gym.reports.page.report import sections_of
+from irl_gym.reports.page.sections.absent import LACKS
+
+WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths")}}
+WITHOUT = {
+    "curve": ({"curve": NO_CURVE}, "learning", "was planned exactly, not trained"),
+    "films": ({"films": {}}, "episodes", "No episode of this run was filmed."),
+    "lambda_path": ({"lambda_path": None}, "lambda", "was not worked out for this run. Of no_path."),
+    "widths": ({"widths": None}, "widths", "was not worked out for this run. Of no_widths."),
+    "diagnosis": ({"diagnosis": None}, "doctor", "The doctor did not look at this run: an earlier version of irl_gym made it."),
+    "told_of_table": ({}, "table", "There is no table: the environment was stepped"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return replace(table_run(tmp_path_factory.mktemp("run"), films=False), stages=WHY)
+
+
+@pytest.mark.parametrize("need", LACKS)
+def test_a_section_that_is_absent_says_why(run, tmp_path, need):
+    changes, name, told = WITHOUT[need]
+    of = stepped_run(tmp_path) if need == "told_of_table" else replace(run, **changes)
+    (section,) = (one for one in sections_of(of) if one.name == name)
+    assert told in section.lead and not section.panels and not section.shown
+
+
+def test_a_run_without_a_table_has_no_sections_of_states(tmp_path):
+    names = [one.name for one in sections_of(stepped_run(tmp_path))]
+    assert names == [
+        "summary", "rewards", "learning", "episodes", "certificate", "doctor", "table", "stages", "asked", "reproduce",
+    ]  # fmt: skip

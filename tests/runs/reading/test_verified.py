@@ -1,0 +1,212 @@
+"""What is said of an expert under a reward is computed from the files that lie there; what contradicts them is refused."""
+
+import copy
+from dataclasses import replace
+from functools import reduce
+
+import numpy as np
+import pytest
+from forgetting import with_digests_anew
+from lake_run import asked
+
+from irl_gym.errors import RunIncomplete
+from irl_gym.features.linear_reward import load_reward
+from irl_gym.files.run_folder import read_json, write_json
+from irl_gym.loop.pipeline import recover_and_retrain
+from irl_gym.mdp.policies import load_actions
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.runs.certificates import claims_in, facts_in
+from irl_gym.runs.reading.verified import again, claims, recomputed, with_again
+from irl_gym.runs.run import read_run
+
+
+@pytest.fixture(scope="module")
+def run(finished):
+    return read_run(finished)
+
+
+def negated(path):
+    one = load_reward(path / "reward.npz")
+    TabularReward(-one.values, one.note).save(path / "reward.npz")
+
+
+def rolled(path):
+    np.savez(path / "expert.npz", actions=np.roll(load_actions(path / "expert.npz"), 1))
+
+
+def discounted(path):
+    with np.load(path / "table.npz") as archive:
+        arrays = dict(archive)
+    np.savez(path / "table.npz", **{**arrays, "gamma": np.array(0.5)})
+
+
+@pytest.mark.parametrize(
+    ("swap", "found"), [(negated, "as recorded"), (rolled, "as recorded"), (discounted, r"gamma 0\.5: expected 0\.99")]
+)
+def test_a_run_whose_files_do_not_bear_out_its_record_is_refused(unvouched, swap, found):
+    swap(unvouched)
+    with pytest.raises(RunIncomplete, match=f"table, expert and reward do not bear out its record: .*{found}"):
+        read_run(unvouched)
+
+
+def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(unvouched, finished):
+    negated(unvouched)
+    for name in ("table.npz", "expert.npz", "reward.npz"):
+        (unvouched / name).unlink()
+    recover_and_retrain(asked(), unvouched)
+    assert read_run(unvouched).recomputed and np.array_equal(
+        read_run(unvouched).learned.values, read_run(finished).learned.values
+    )
+
+
+def test_what_is_said_of_the_expert_is_computed_and_not_read(unvouched, run):
+    for name in ("metrics.json", "certificate.json"):
+        edited(
+            unvouched / name,
+            **({"reward.expert_optimal": False} if name == "metrics.json" else {"optimality.expert_optimal": False}),
+        )
+    assert read_run(unvouched).metrics["reward"] == run.metrics["reward"] and run.recomputed
+
+
+def test_on_a_table_its_word_counts_more_than_that_of_episodes(finished, run):
+    proof, negative = {"expert_optimal": True, "facts": []}, TabularReward(-run.tabular.values)
+    found = recomputed(finished, run.config, {"optimality": None, "proof": proof}, run.table, run.expert, negative)
+    assert found["facts"][0]["sentence"].startswith("no: the best policy earns at least")
+    assert claims_in({"optimality": found, "proof": proof})["expert_optimal"] is False
+
+
+def test_facts_of_the_reward_are_computed_and_not_read(copied, run):
+    edited(copied / "certificate.json", **{"optimality.facts": [{"label": "tied", "sentence": "a lie", "mood": "good"}]})
+    found = read_run(with_digests_anew(copied))
+    assert facts_in(found.certificate)[0] == facts_in(run.certificate)[0] and "a lie" not in str(found.certificate)
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "why"),
+    [
+        ("proof.facts", "all is well", "facts are 'all is well': expected a list"),
+        ("proof.unbreakable_rows", [[99, 0]], r"unbreakable is \[\[99, 0\]\]: expected \(u, 2\)"),
+        ("optimality", 7, "optimality is 7: expected an object"),
+    ],
+)
+def test_a_certificate_that_is_none_is_refused_and_the_mend_works(finished, unvouched, entry, value, why):
+    edited(unvouched / "certificate.json", **{entry: value})
+    with pytest.raises(RunIncomplete, match=why):
+        read_run(unvouched)
+    (unvouched / "certificate.json").unlink()
+    recover_and_retrain(asked(), unvouched)
+    assert read_run(unvouched).certificate == read_run(finished).certificate
+
+
+def test_values_by_episodes_are_said_to_be_the_record_s(run):
+    policies = {**run.metrics["policies"], "expert": run.metrics["policies"]["expert"] | {"sampled_value": 1.0}}
+    told = replace(run, metrics={**run.metrics, "policies": policies})
+    assert told.whose == run.whose.removesuffix(".") + ", and among it values by episodes."
+
+
+# --- digests that were made anew ---
+
+
+def edited(path, **changes):
+    """A json file in which some entries, by their dotted names, are others."""
+    content = read_json(path)
+    for name, value in changes.items():
+        *where, last = name.split(".")
+        reduce(dict.__getitem__, where, content)[last] = value
+    write_json(path, content)
+
+
+EDITS = {
+    "metrics.json": {
+        "reward.learner": ("Theirs", "config.json"), "demonstrations.given": (True, "config.json"),
+        "reward.status": ("inaccurate", r"\.stages/reward\.json"),
+        "demonstrations.episodes": (7, r"\.stages/demonstrations\.json"),
+        "reward.degenerate": (True, r"certificate\.json"), "reward.violated_states": (3, r"certificate\.json"),
+        "table.exact": (False, r"table\.npz"), "table.states": (17, r"table\.npz"), "table.horizon": (3, r"table\.npz"),
+        "policies.random.value": (0.0, r"table\.npz"), "policies.expert.value": (2.0, r"expert\.npz"),
+        "policies.retrained.value": (0.9, r"agent_policy\.npz"),
+    },
+    "certificate.json": {"proof.duality_gap": (0.5, r"certificate\.json"), "optimality.zero": (True, r"certificate\.json")},
+    "config.json": {"learner.type": ("FeatureLP", r"config\.json"), "epsilon": (0.1, r"config\.json")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "entry"), [(name, entry) for name, entries in EDITS.items() for entry in entries])
+def test_an_entry_that_other_files_contradict_is_named_with_them(copied, name, entry):
+    value, source = EDITS[name][entry]
+    edited(copied / name, **{entry: value})
+    with pytest.raises(RunIncomplete, match=rf"metrics\.json has \S+ .*: expected .*, as {source} gives it; delete "):
+        read_run(with_digests_anew(copied))
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "value", "gone"),
+    [
+        ("metrics.json", "reward.status", "inaccurate", ["metrics.json"]),
+        ("certificate.json", "proof.objective", 7.0, ["certificate.json", "metrics.json"]),
+        ("environment.json", "id", "Theirs-v0", ["environment.json"]),
+    ],
+)
+def test_what_was_edited_is_refused_by_who_reads_and_who_continues_and_the_mend_works(
+    finished, copied, name, entry, value, gone
+):
+    edited(copied / name, **{entry: value})
+    with_digests_anew(copied)
+    for read in (read_run, lambda path: recover_and_retrain(asked(), path)):
+        with pytest.raises(RunIncomplete, match=f"delete {' and '.join(gone)}, and .* again"):
+            read(copied)
+    for one in gone:
+        (copied / one).unlink()
+    recover_and_retrain(asked(), copied)
+    assert read_run(copied).vouched and (copied / name).read_bytes() == (finished / name).read_bytes()
+
+
+def test_an_agent_that_was_swapped_is_named_and_made_again(copied, run):
+    other = 0 if run.metrics["policies"]["retrained"]["value"] else run.expert  # of another value
+    np.savez(copied / "agent_policy.npz", actions=np.zeros_like(run.expert) + other)
+    with pytest.raises(RunIncomplete, match=r"as agent_policy\.npz gives it; delete agent_policy\.npz and metrics\.json, and"):
+        read_run(with_digests_anew(copied))
+    for name in ("agent_policy.npz", "metrics.json"):
+        (copied / name).unlink()
+    recover_and_retrain(asked(), copied)
+    assert np.array_equal(read_run(copied).agent, run.agent)
+
+
+RECORDED = {
+    f"policies.{name}.{key}"
+    for name in ("expert", "random", "retrained")
+    for key in ("mean_return", "return_low", "return_high", "return_share")
+}
+"""Of metrics.json, what is sampled: the page says that it is the run's own record."""
+
+
+def leaves(content, where=""):
+    """The dotted names of what a json object holds."""
+    for key, value in content.items():
+        yield from leaves(value, f"{where}{key}.") if isinstance(value, dict) else [f"{where}{key}"]
+
+
+def test_each_entry_is_compared_or_computed_or_known_to_be_a_record(finished, run):
+    told = read_json(finished / "metrics.json")
+    parts = run.config, run.stages, run.certificate, told, run.table
+    claimed, now = again(run.config, told, run.table, run.expert, run.agent, run.tabular, run.curve)
+    checked, left = [*claims(*parts), *claimed], set()
+    assert with_again(told, now) == told == {**run.metrics, "reward": told["reward"]}
+    for name in leaves(told):
+        other = copy.deepcopy(told)
+        *where, last = name.split(".") if "steps_to_" not in name else name.split(".", 1)
+        reduce(dict.__getitem__, where, other)[last] = "another"
+        if not any(one.fault(other) for one in checked) and with_again(other, now) != told:
+            left.add(name)
+    assert left == RECORDED
+
+
+def test_a_horizon_without_an_end_leaves_the_values_to_the_record(run):
+    metrics = {**run.metrics, "table": {**run.metrics["table"], "horizon": 10**9}}
+    assert again(run.config, metrics, run.table, run.expert, run.agent, run.tabular, run.curve) is None
+    assert replace(run, recomputed=False, judged_again=False).whose == "Everything is the run's own record."
+
+
+def test_a_page_says_what_was_computed_again_and_that_all_else_is_a_record(finished, run):
+    assert "values, scores and agreement" in run.whose and run.whose.endswith("All else is the run's own record.")
+    assert run.whose.replace("'", "&#39;") in (finished / "report.html").read_text()

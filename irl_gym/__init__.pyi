@@ -11,7 +11,7 @@ from .facts import Fact as Fact
 from .features.linear_reward import LinearReward as LinearReward
 from .judging.diagnoses.doctor import doctor as doctor
 from .judging.metrics import worst_tie as worst_tie
-from .learners.base import IRLResult as IRLResult
+from .learners.base import Outcome as Outcome
 from .learners.linear_programs.feature import FeatureLP as FeatureLP
 from .learners.linear_programs.finite import FiniteLP as FiniteLP
 from .learners.linear_programs.trajectory import TrajectoryLP as TrajectoryLP

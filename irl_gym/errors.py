@@ -9,9 +9,11 @@ IrlGymError
 │   ├── InvalidFeatures        features with NaN, of the wrong length, or of other observations
 │   ├── InvalidParameter       a hyper-parameter outside its range
 │   ├── DamagedFile            a file that was cut off or changed, or that declares more than it can hold
+│   ├── MissingPart            a learner needs a part of a problem that is not there
 │   ├── UnknownObservation     an observation that the state index does not hold
 │   └── InvalidDemonstrations  episodes that no environment could have produced
 ├── UnknownEnvironment         an id that is not registered; the closest names are offered
+├── UnknownLearner             a learner that is neither built in nor found where its name says
 ├── NotTrusted                 what a file names, and would have been imported and called
 ├── NotDiscrete                a space with infinitely many elements where finitely many are needed
 ├── NotTabular                 an environment that publishes no table, or whose table is not the whole truth
@@ -78,6 +80,10 @@ class DamagedFile(InvalidInput):
     """A file that was cut off or changed, that leads elsewhere, or that declares more than it can hold."""
 
 
+class MissingPart(InvalidInput):
+    """A learner needs a part of a problem that is not there."""
+
+
 class UnknownObservation(InvalidInput):
     """An observation that the state index does not hold."""
 
@@ -88,6 +94,10 @@ class InvalidDemonstrations(InvalidInput):
 
 class UnknownEnvironment(IrlGymError):
     """An environment id that is not registered."""
+
+
+class UnknownLearner(IrlGymError):
+    """A learner that is neither built in nor found where its name says."""
 
 
 class NotTrusted(IrlGymError):

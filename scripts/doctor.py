@@ -91,7 +91,7 @@ def main(arguments: Arguments) -> int:
     if diagnosis is None:
         return 2
     show(diagnosis, console, run)
-    if run is None or run.table is not None:
+    if diagnosis.examined and (run is None or run.table is not None):
         console.print(Text(f"\n{WHOSE}"))
     if run is not None and run.caution is not None:
         console.print(Text(f"\n{run.caution}"))

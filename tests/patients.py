@@ -6,7 +6,7 @@ from models import ring
 from irl_gym.features.feature_maps import Table
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses.doctor import doctor
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.proofs.finite_proof import prove
 from irl_gym.learners.linear_programs.proofs.trajectory_proof import TrajectoryProof
 from irl_gym.mdp.margins import comparable
@@ -22,7 +22,7 @@ def judged(mdp, expert, R, stats=None):
     reward = TabularReward(np.asarray(R, dtype=float))
     compared = compare(mdp, completed(expert, mdp.n_states)[0])
     proof = prove(mdp, compared, reward, comparable(compared, reward), r_max=1.0)
-    return IRLResult(reward, Status.OPTIMAL, proof, stats or {})
+    return Outcome(reward, Status.OPTIMAL, proof, stats or {})
 
 
 def names(result, mdp, expert, **known):
@@ -74,4 +74,4 @@ def sampled(**changes):
         "round": 2, "rounds": 2,
     }  # fmt: skip
     proof = TrajectoryProof(**{**healthy, **changes})
-    return IRLResult(LinearReward(np.array([1.0, -0.5]), Table(np.eye(2))), Status.OPTIMAL, proof, stats)
+    return Outcome(LinearReward(np.array([1.0, -0.5]), Table(np.eye(2))), Status.OPTIMAL, proof, stats)

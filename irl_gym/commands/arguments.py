@@ -2,30 +2,25 @@
 
 import ast
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast, get_args
 
-import gymnasium as gym
 from gymnasium import spaces
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import Planner
+from irl_gym.commands.learning_arguments import TAKEN, Learning
 from irl_gym.commands.terminal import UNSET
 from irl_gym.demonstrations.endings import AfterEnd
 from irl_gym.errors import InvalidParameter
-from irl_gym.learners.linear_programs.feature import FeatureLP
-from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.learners.registry import learner_of
 from irl_gym.runs.experiment import Experiment, parse_keywords
 from irl_gym.runs.named_parts import (
     KNOWN,
-    FeatureName,
-    LearnerName,
     PlannerName,
     Reveals,
     environment_of,
-    features_named,
     planner_named,
     steps_only,
 )
@@ -121,63 +116,6 @@ class Demonstrations:
 
 
 @dataclass(frozen=True)
-class Learning:
-    """How the reward is recovered."""
-
-    learner: LearnerName = "finite-lp"
-    """Ng & Russell's section 3 (finite-lp), 4 (feature-lp) or 5 (trajectory-lp)."""
-    l1: float | Literal["auto"] = 0.0
-    """Price of ||R||_1, of ||alpha||_1 with features: a number, or auto for just below lambda_0 (finite-lp)."""
-    margin_cap: float | Literal["auto", "none"] = "auto"
-    """finite-lp and feature-lp. Cap on margins: a number, auto, or none for the paper's own program."""
-    slack: float | Literal["auto", "none"] = "auto"
-    """finite-lp. Price of a violation, where a margin is worth 1; none: not at any price. auto: 1 for an expert of episodes."""
-    reward_on: Literal["state", "state-action"] = "state"
-    """finite-lp. What the recovered reward is a function of."""
-    features: FeatureName = "auto"
-    """feature-lp and trajectory-lp. auto is one-hot for discrete observations, radial for others."""
-    size: Annotated[int | None, UNSET] = None
-    """Of the features: centres along each coordinate, Fourier order, or degree."""
-    coordinates: Annotated[tuple[int, ...], UNSET] = ()
-    """Values of each coordinate that a discrete observation is made of, such as 5 5 5 4 for Taxi."""
-    sample: Annotated[int | None, UNSET] = None
-    """feature-lp. States in S_0, drawn at random; the default is all."""
-    rounds: Annotated[int | None, UNSET] = None
-    """trajectory-lp. At most; the default is 30 on tables, 8 on environments that are stepped."""
-    gap_cap: Literal["auto", "none"] = "none"
-    """trajectory-lp. auto lets no policy that is far worse than the expert outweigh the others."""
-    inner: Annotated[PlannerName | None, UNSET] = None
-    """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
-    time_limit: Annotated[float | None, UNSET] = None
-    """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
-
-    @property
-    def cap(self) -> float | Literal["auto"] | None:
-        """The margin cap as learners take it."""
-        return None if self.margin_cap == "none" else self.margin_cap
-
-    def finite(self, from_episodes: bool) -> FiniteLP:
-        """The learner of section 3."""
-        slack = 1.0 if from_episodes and self.reward_on == "state" else None
-        if self.slack != "auto":
-            slack = None if self.slack == "none" else self.slack
-        return FiniteLP(
-            l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack,
-            time_limit=self.time_limit,
-        )  # fmt: skip
-
-    def linear(self, env: gym.Env, control: bool, seed: int) -> FeatureLP | TrajectoryLP:
-        """The learner of section 4 or 5."""
-        phi = features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
-        l1: Any = self.l1
-        if self.learner == "feature-lp":
-            return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed, time_limit=self.time_limit)
-        rounds = self.rounds if self.rounds is not None else 8 if control else 30
-        gap_cap = "auto" if self.gap_cap == "auto" else None
-        return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed, time_limit=self.time_limit)
-
-
-@dataclass(frozen=True)
 class Retraining:
     """Who learns from the recovered reward."""
 
@@ -199,7 +137,7 @@ class Arguments:
     """How the table of its transitions is made."""
     demonstrations: Demonstrations = Demonstrations()
     """Who shows what is wanted."""
-    learning: Learning = Learning()
+    learning: Learning = field(default_factory=Learning)
     """How the reward is recovered."""
     retraining: Retraining = Retraining()
     """Who learns from the recovered reward."""
@@ -218,17 +156,25 @@ class Arguments:
         given, shown = self.environment, self.demonstrations
         env_id = given.env_id or (None if shown.dataset else "FrozenLake-v1")
         env_kwargs, reveal = parse_keywords(given.env_kwargs), parse_reveal(given.reveal)
-        control = discrete = False
+        control, discrete, features = False, False, None
+        self.learning.check()
         if self.learning.learner == "finite-lp":
             learner: Any = self.learning.finite(from_episodes=shown.dataset is not None or shown.epsilon > 0)
         else:
+            own = (
+                None
+                if self.learning.learner in TAKEN
+                else learner_of(self.learning.learner, parse_keywords(self.learning.options))
+            )
             env = environment_of(
                 env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal,
                 trust_dataset=shown.trust_dataset,
             )  # fmt: skip
             control = not self.table.bins and steps_only(env)
             discrete = isinstance(env.observation_space, spaces.Discrete)
-            learner = self.learning.linear(env, control, self.seed)
+            learner = self.learning.linear(env, control, self.seed) if own is None else own
+            if own is not None and "features" in own.needs.parts:
+                features = self.learning.phi(env)
         shaped = self.retraining.shaping and not control
 
         def planner(name: PlannerName | None, *, advantages: bool = False) -> Planner | None:
@@ -244,7 +190,7 @@ class Arguments:
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
             bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
             shown.trust_dataset,
-            shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner,
+            shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, features=features,
             inner=planner(self.learning.inner), shaping=self.retraining.shaping,
             retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
         )  # fmt: skip

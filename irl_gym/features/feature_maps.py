@@ -73,6 +73,8 @@ def as_features(features: Any) -> FeatureMap:
     Raises:
         InvalidFeatures: neither.
     """
+    if features is None:
+        raise InvalidFeatures("features is None: expected phi. Give it features, or `learn` a problem that has some.")
     if isinstance(features, type):
         raise InvalidFeatures(f"the features are the class {features.__name__}: expected one made of it, such as OneHot(16).")
     return features if isinstance(features, FeatureMap) else Table(features)

@@ -94,8 +94,8 @@ class Certificate(TypedDict):
 class _Rewarded(Proof):
     learner: Text
     status: StatusName
-    expert_optimal: bool | None
-    degenerate: bool
+    expert_optimal: NotRequired[bool | None]
+    degenerate: NotRequired[bool]
     rounds: NotRequired[Count]
     best_round: NotRequired[Count]
     states: NotRequired[Count]
@@ -129,9 +129,9 @@ class Row(TypedDict):
     loses_at_most: NotRequired[Number | None]
 
 
-def _three(rows: Any) -> Any:
-    """Refuse rows that lack one of those that every run judges."""
-    lacking = [name for name in ("expert", "random", "retrained") if name not in rows]
+def _with_references(rows: Any) -> Any:
+    """Refuse rows that lack one of those that others are measured by."""
+    lacking = [name for name in ("expert", "random") if name not in rows]
     if lacking:
         raise ValueError(f"a policy {lacking[0]}")
     return rows
@@ -188,7 +188,7 @@ Training = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Co
 class Metrics(TypedDict):
     """metrics.json, of `scorecard.scorecard`."""
 
-    policies: Annotated[dict[str, Row], AfterValidator(_three)]
+    policies: Annotated[dict[str, Row], AfterValidator(_with_references)]
     reward: Annotated[_Rewarded, AfterValidator(_together)]
     training: Training
     table: Sized | None

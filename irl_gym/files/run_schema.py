@@ -196,10 +196,10 @@ class Planned(Stage):
 
 
 class Retrained(Timed):
-    """Of the agent."""
+    """Of the agent; of none where the learner gave no reward."""
 
-    planner: Text
-    environment_steps: Count
+    planner: NotRequired[Text]
+    environment_steps: NotRequired[Count]
 
 
 class Open(Stage):

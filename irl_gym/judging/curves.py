@@ -44,6 +44,10 @@ class Curve:
     """(n,) upper end."""
 
 
+NO_CURVE = Curve(*np.zeros((5, 0)))
+"""Of an agent that was not trained step by step, or of none."""
+
+
 def write_curve(curve: Curve, path: Path) -> None:
     """Write a curve as csv; what is not known is left empty."""
     numbers = (curve.value, curve.mean, curve.low, curve.high)

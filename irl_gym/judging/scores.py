@@ -23,6 +23,8 @@ EXPERT, RANDOM = REFERENCES = ("expert", "random")
 """The judged policies whose scores are 1 and 0 by definition: what all others are measured by."""
 RETRAINED = "retrained"
 """The agent that was retrained on the recovered reward alone: what a run of the loop is about."""
+LEARNED = "learned"
+"""The policy that the learner gave, where it gives one."""
 FEWEST = 11
 """Episodes below which their spread is not believed."""
 BLUR = 0.25

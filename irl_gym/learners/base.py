@@ -2,13 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
 
 from irl_gym.checks import checked_number
+from irl_gym.errors import InvalidParameter
 from irl_gym.facts import Fact
 from irl_gym.features.linear_reward import LinearReward
-from irl_gym.mdp.policies import Policy
+from irl_gym.learners.needs import Needs
+from irl_gym.learners.problem import Problem
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.programs.solvers import Status, check_solving
 
@@ -36,24 +40,33 @@ class Proof(Protocol):
         ...
 
 
-AnyReward = TypeVar("AnyReward", TabularReward, LinearReward)
+AnyReward = TypeVar("AnyReward", bound=TabularReward | LinearReward | None)
+AnyLearner = TypeVar("AnyLearner")
 AnyProof = TypeVar("AnyProof", bound=Proof)
 
 
 @dataclass(frozen=True, eq=False)
-class IRLResult(Generic[AnyReward, AnyProof]):
-    """A learned reward, and what the learner proves of it."""
+class Outcome(Generic[AnyReward, AnyProof]):
+    """What was learned, a reward or a policy or both, and what the learner proves of it.
+
+    Raises:
+        InvalidParameter: neither a reward nor a policy.
+    """
 
     reward: AnyReward
-    """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival."""
+    """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival; None of a learner of policies."""
     status: Status
     """What became of the program; `status.sentence` says it."""
     proof: AnyProof
     """What the learner proves of its program, such as a FiniteProof; what the reward says of the expert, `certify` tells."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, seconds, iterations, program by program."""
-    policy: Policy | None = None
-    """A policy planned for the reward, where learning made one."""
+    policy: Any = None
+    """Of a table (S,) actions or (S, A) probabilities; else what has `predict`. None of a learner of rewards alone."""
+
+    def __post_init__(self) -> None:
+        if self.reward is None and self.policy is None:
+            raise InvalidParameter("reward and policy are None: expected what was learned, at least one of the two.")
 
     def facts(self) -> tuple[Fact, ...]:
         """What became of the program, and what the proof says."""
@@ -67,20 +80,38 @@ class IRLResult(Generic[AnyReward, AnyProof]):
 
 @runtime_checkable
 class Learner(Protocol):
-    """Turns a world without reward and an expert into a reward.
+    """Learns from what is known of an expert and a world: a frozen record of hyper-parameters.
 
-    The loop gives `fit` a table and what is known of the expert's policy, unless the learner says in `takes` what else: names
-    of parts of the loop (`irl_gym.loop.loop.Loop`), the first two in this order, any other by its name.
+    It may say in `how` how its policy comes about, and in `of_feasible_set` that its reward is one of all those under which the
+    expert is optimal, so that these are examined.
     """
 
-    def fit(self, world: Any, expert: Any, /) -> IRLResult[Any, Any]:
-        """Learn a reward under which the expert is optimal: of a table and a policy, or of a simulator and episodes."""
+    needs: ClassVar[Needs]
+    """The parts of a problem that it reads."""
+
+    def learn(self, problem: Problem, rng: np.random.Generator) -> Outcome[Any, Any]:
+        """Learn a reward, a policy, or both.
+
+        Args:
+            problem: what is known.
+            rng: of what is drawn, but for a learner that has a seed of its own.
+
+        Raises:
+            MissingPart: the problem lacks a part that is needed.
+        """
         ...
 
 
-def takes(learner: Learner) -> tuple[str, ...]:
-    """The parts of the loop that a learner's `fit` is given."""
-    return getattr(learner, "takes", ("mdp", "known_expert"))
+def featured(learner: AnyLearner, problem: Problem) -> AnyLearner:
+    """A learner with the features of a problem, where it has none of its own.
+
+    Raises:
+        MissingPart: nor has the problem.
+    """
+    if getattr(learner, "features", None) is not None:
+        return learner
+    told: Any = learner
+    return replace(told, features=Needs(("features",)).of(problem, learner).features)
 
 
 def without_nan(value: Any) -> Any:

@@ -22,6 +22,7 @@ from irl_gym.judging.ambiguity.lambda_path import lambda_path
 from irl_gym.judging.ambiguity.widths import feasible_widths
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose, weights_of
+from irl_gym.judging.diagnoses.findings import NO_REWARD
 from irl_gym.learners.base import Learner
 from irl_gym.loop.filming import film
 from irl_gym.loop.worlds import World
@@ -45,13 +46,16 @@ MOST_STEPS = 2_500
 
 def films(
     folder: Path, world: World, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
-    expert: Any, agent: Any, learned: TabularReward | LinearReward, seed: int,
+    expert: Any, agent: Any, learned_policy: Any, learned: TabularReward | LinearReward | None, seed: int,
 ) -> dict[str, Any]:  # fmt: skip
-    """An episode of the expert, the first of a dataset where one was given, and one of the agent; why some have no pictures."""
+    """An episode of the expert, the first of a dataset where one was given, and one of the agent, which without a reward is the
+    learner's; why some have no pictures.
+    """
     (folder / "films").mkdir()
     first = world.chooser(expert, seed) if given is None else (seen_parts(demonstrations) or demonstrations)[0]
     without = {}
-    for name, shown in {"expert": first, "agent": world.chooser(agent, seed)}.items():
+    shown_agent = world.chooser(learned_policy if agent is None else agent, seed)
+    for name, shown in {"expert": first, "agent": shown_agent}.items():
         made = film(name, env, shown, seed, partial(world.pays, learned), env_id)
         made.save(folder / "films")
         if made.without_frames is not None:
@@ -72,7 +76,7 @@ def figures_as_csv(folder: Path, judged: Mapping[str, Any], env_id: str | None, 
 
 
 def diagnosis(
-    folder: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward,
+    folder: Path, mdp: TabularMDP | None, known_expert: Any, learned: TabularReward | LinearReward | None,
     tabular: TabularReward | None, true: TabularReward | None, certificate: Mapping[str, Any], solved: Mapping[str, Any],
     shaping: bool, judged: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
@@ -82,7 +86,7 @@ def diagnosis(
         mdp, known_expert, tabular, claims_in(certificate), status, solved["stats"], true, shaping, judged, weights_of(learned)
     )
     try:
-        found = diagnose(case)
+        found = NO_REWARD if learned is None else diagnose(case)
     except IrlGymError as error:
         found = Diagnosis((), "", f"the examination failed ({type(error).__name__}: {error})")
     write_json(folder / "diagnosis.json", found.to_json())

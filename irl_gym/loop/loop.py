@@ -22,19 +22,19 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import read_minari
-from irl_gym.demonstrations.demonstrated import most_frequent, visits
+from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.run_folder import RunFolder, read_json
-from irl_gym.judging.curves import Curve, read_curve
-from irl_gym.learners.base import takes
+from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
+from irl_gym.judging.scores import LEARNED
+from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.loop import figures, final_stages, stages
-from irl_gym.loop.stages import OnProgress
+from irl_gym.loop.stages import REWARD, OnProgress
 from irl_gym.loop.world_choice import place_of
 from irl_gym.loop.worlds import World
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
@@ -44,7 +44,7 @@ from irl_gym.runs.experiment import Experiment, as_config
 from irl_gym.runs.identity import STAGES, claim, record_start, write_environment, write_version
 from irl_gym.runs.named_parts import environment_of
 from irl_gym.runs.scorecard import RECORDS
-from irl_gym.runs.supply import missing, part, supplied
+from irl_gym.runs.supply import missing, supplied
 from irl_gym.tables.table_files import TABLE
 
 Make = Callable[..., Mapping[str, Any]]
@@ -55,7 +55,7 @@ MAKERS: dict[str, tuple[Make, ...]] = dict(
         (
             (stages.planned_expert, stages.recorded_expert),
             (stages.played_episodes, stages.recorded_episodes),
-            (stages.recovered_reward,),
+            (stages.learned_outcome,),
             (stages.retrained_agent,),
             (stages.metrics,),
             (figures.of_table, figures.returns, figures.learning_curve),
@@ -201,21 +201,29 @@ class Loop:
         """What the episodes show of the expert in the table; None where a learner is given its whole policy."""
         return self.world.seen(self.demonstrations) if self.experiment.from_episodes else None
 
+    @cached_property
+    def problem(self) -> Problem:
+        """What the learner is given of all that is known: the parts that it needs. Nothing else is worked out."""
+        asked, world = self.experiment, self.world
+        parts: dict[str, Callable[[], Any]] = {
+            "demonstrations": lambda: self.demonstrations,
+            "expert": lambda: None if asked.from_episodes else self.expert,
+            "environment": lambda: self.simulator,
+            "oracle": lambda: None if self.given is not None else Oracle(world.actor(self.expert, asked.seed)),
+            "dynamics": lambda: world.mdp,
+            "reward": lambda: world.true,
+            "features": lambda: asked.features,
+            "gamma": lambda: world.gamma,
+            "horizon": lambda: world.horizon,
+            "also": lambda: (),
+        }
+        known = asked.learner.needs.worked_out(parts)
+        return Problem(Spaces(self.env.observation_space, self.env.action_space, world.states), **known)
+
     @property
     def known_expert(self) -> Any:
         """What a learner of tables is given of the expert: its policy, or the most frequent actions, NaN where not seen."""
         return self.expert if self.seen is None else most_frequent(self.seen)
-
-    @property
-    def visits(self) -> np.ndarray | None:
-        """(S,) how often the episodes visit each state; None where a learner is given the expert's whole policy."""
-        return None if self.seen is None else visits(self.seen)
-
-    @cached_property
-    def lesson(self) -> Mapping[str, Any]:
-        """What the learner takes, by name."""
-        learner = self.experiment.learner
-        return {name: part(name, *self.sources, asked_by=type(learner).__name__) for name in takes(learner)}
 
     @cached_property
     def solved(self) -> Mapping[str, Any]:
@@ -223,9 +231,15 @@ class Loop:
         return self.stage("reward")
 
     @cached_property
-    def learned(self) -> TabularReward | LinearReward:
-        """The recovered reward."""
-        return self.folder.load("reward.npz", load_reward)
+    def learned(self) -> TabularReward | LinearReward | None:
+        """The recovered reward; None of a learner of policies alone."""
+        return self.folder.load(REWARD, load_reward) if REWARD in self.stage("reward")["files"] else None
+
+    @cached_property
+    def learned_policy(self) -> Any:
+        """The learner's own policy, as `agent`; None of a learner of rewards alone."""
+        kept = any(name.startswith(LEARNED) for name in self.stage("reward")["files"])
+        return self.world.load(self.folder, LEARNED) if kept else None
 
     @cached_property
     def tabular(self) -> TabularReward | None:
@@ -244,13 +258,13 @@ class Loop:
 
     @cached_property
     def agent(self) -> Any:
-        """The retrained agent, deterministic: (S,) actions of a table, else a policy."""
-        return self.world.load(self.folder, "agent")
+        """The retrained agent, deterministic: (S,) actions of a table, else a policy; None where there is no reward."""
+        return None if self.learned is None else self.world.load(self.folder, "agent")
 
     @cached_property
     def curve(self) -> Curve:
-        """What the agent was worth as it trained; without points where it was planned exactly."""
-        return self.folder.load("learning_curve.csv", read_curve)
+        """What the agent was worth as it trained; without points where it was planned exactly, or there is none."""
+        return NO_CURVE if self.learned is None else self.folder.load("learning_curve.csv", read_curve)
 
     @property
     def records(self) -> Mapping[str, Mapping[str, Any]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
+from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import AfterEnd, left_out
@@ -21,8 +22,9 @@ from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.run_folder import LOGS, write_json
 from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED
+from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner
+from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.worlds import World
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
@@ -30,9 +32,11 @@ from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import certificate_of
 from irl_gym.runs.logs import log_scalars, logged
-from irl_gym.runs.scorecard import came_about, how_of, scorecard
+from irl_gym.runs.scorecard import came_about, how_of, outcome_of, scorecard
 from irl_gym.tables.tabulation import Tabulation
 
+REWARD = "reward.npz"
+"""Where the recovered reward is kept."""
 OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
 
@@ -90,18 +94,21 @@ def played_episodes(
     }
 
 
-def recovered_reward(
-    folder: Path, learner: Learner, lesson: Mapping[str, Any], table: Tabulation | None, known_expert: Any, from_episodes: bool
-) -> dict[str, Any]:
-    """The reward that a learner finds, and what it proves; the lesson is what the learner takes."""
-    world, expert, *more = lesson
-    result = learner.fit(lesson[world], lesson[expert], **{name: lesson[name] for name in more})
-    result.reward.save(folder / "reward.npz")
+def learned_outcome(
+    folder: Path, learner: Learner, problem: Problem, world: World, seed: int, table: Tabulation | None, known_expert: Any,
+    from_episodes: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """The reward or the policy that a learner finds, or both, and what it proves."""
+    outcome = learner.learn(problem, np.random.default_rng(seed))
+    if outcome.reward is not None:
+        outcome.reward.save(folder / REWARD)
+    if outcome.policy is not None:
+        world.keep(outcome.policy, folder, LEARNED)
     known = None if table is None else (table, known_expert)
-    write_json(folder / "certificate.json", certificate_of(result, known, episodes=from_episodes))
-    record = {"learner": type(learner).__name__, **result.record()}
-    if "simulator" in lesson:
-        record["stats"]["inner"] = type(lesson["simulator"].planner).__name__
+    write_json(folder / "certificate.json", certificate_of(outcome, known, episodes=from_episodes))
+    record = {"learner": type(learner).__name__, "how": outcome_of(learner), **outcome.record()}
+    if isinstance(problem.environment, Simulator):
+        record["stats"]["inner"] = type(problem.environment.planner).__name__
     return record
 
 
@@ -123,16 +130,17 @@ def retrained_agent(
 
 
 def metrics(
-    folder: Path, world: World, expert: Any, agent: Any, given: list[Episode] | None, demonstrations: list[Episode],
-    from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None, horizon: int | None,
-    tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
+    folder: Path, world: World, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
+    demonstrations: list[Episode], from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None,
+    horizon: int | None, tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
     certificate: Mapping[str, Any], curve: Curve,
 ) -> dict[str, Any]:  # fmt: skip
     """How good everything is under the true reward."""
     how = came_about(config, records)
+    made = {EXPERT: expert, RANDOM: world.random, LEARNED: learned_policy, RETRAINED: agent}
+    policies = {name: (one, how[name]) for name, one in made.items() if one is not None or name == EXPERT}
     rows, scale = evaluate(
-        {EXPERT: (expert, how[EXPERT]), RANDOM: (world.random, how[RANDOM]), RETRAINED: (agent, how[RETRAINED])},
-        world, table, horizon, given=None if given is None else demonstrations, episodes_only=from_episodes,
+        policies, world, table, horizon, given=None if given is None else demonstrations, episodes_only=from_episodes,
         episodes=eval_episodes, seed=seed,
     )  # fmt: skip
     content = scorecard(config, records, certificate, rows, scale, curve, table, horizon, tabular)

@@ -110,11 +110,11 @@ class TableWorld:
         )  # fmt: skip
         return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
 
-    def tabular(self, reward: TabularReward | LinearReward) -> TabularReward:
-        """A reward of either kind in the table."""
+    def tabular(self, reward: TabularReward | LinearReward | None) -> TabularReward | None:
+        """A reward of either kind in the table; None where there is none."""
         return reward.tabular(self.table.states) if isinstance(reward, LinearReward) else reward
 
-    def weights(self, reward: TabularReward | LinearReward) -> None:
+    def weights(self, reward: TabularReward | LinearReward | None) -> None:
         """What a reward of features is known by; here it is one of rows."""
 
     def paid(self, reward: TabularReward | LinearReward, *, shaped: bool, margin_cap: float | None) -> TabularReward:
@@ -125,12 +125,19 @@ class TableWorld:
         return ExpectedAdvantage(margin_cap or typical_loss(plain, self.mdp)).apply(plain, self.mdp)
 
     def pays(
-        self, reward: TabularReward | LinearReward, observations: Sequence[Any], actions: Sequence[int], *, terminated: bool
-    ) -> tuple[list[int | None], np.ndarray]:
+        self,
+        reward: TabularReward | LinearReward | None,
+        observations: Sequence[Any],
+        actions: Sequence[int],
+        *,
+        terminated: bool,
+    ) -> tuple[list[int | None], np.ndarray]:  # fmt: skip
         """Rows of T + 1 observations, None where the table has none, and (T,) what a reward pays for the steps, NaN there."""
         last = len(actions) if terminated else None
         rows = [self._row(one, terminated=time == last) for time, one in enumerate(observations)]
         paid, steps = self.tabular(reward), zip(rows, actions, rows[1:], strict=False)
+        if paid is None:
+            return rows, np.full(len(actions), np.nan)
         return rows, np.array([np.nan if s is None or t is None else float(paid.pay(s, a, t)) for s, a, t in steps])
 
     def _row(self, observation: Any, *, terminated: bool) -> int | None:
@@ -143,8 +150,17 @@ class TableWorld:
         """Write the table, unless it is there."""
         keep_table(self.table, folder)
 
-    def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
-        """Write the actions, or with noise or of a table with several the probabilities; an agent in SB3's zip too."""
+    def keep(self, policy: Any, folder: Path, name: str, epsilon: float = 0.0) -> None:
+        """Write the actions, or with noise or of a table with several the probabilities; an agent in SB3's zip too.
+
+        Args:
+            policy: what has `predict`; or (S,) actions, (S, A) probabilities or set.
+            folder: where to.
+            name: of the file.
+            epsilon: probability of a random action in its place.
+        """
+        if not isinstance(policy, Policy):
+            policy = self.actor(policy, self.seed)
         if isinstance(policy, Agent):
             policy.save(folder / f"{name}.zip")
         actions: Any = tabular_actions(policy, self.table.states)
@@ -168,10 +184,11 @@ class TableWorld:
 
     def chooser(self, policy: Any, seed: int) -> Choose:
         """What acts as in the episodes that judge a policy."""
-        actor = self._actor(policy, seed)
+        actor = self.actor(policy, seed)
         return lambda observation: int(actor.predict(observation)[0])
 
-    def _actor(self, policy: Any, seed: int) -> TabularPolicy:
+    def actor(self, policy: Any, seed: int) -> TabularPolicy:
+        """A policy that acts on observations."""
         return TabularPolicy(as_distribution(policy, self.mdp.n_states, self.mdp.n_actions), self.states, seed)
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
@@ -182,7 +199,7 @@ class TableWorld:
                 table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=limit
             )
             return list(drawn)
-        actor = self._actor(policy, seed)
+        actor = self.actor(policy, seed)
         if table.evidence.exact:
             return list(collect(self.env, actor, n, seed=seed, max_episode_steps=limit))
         return run_episodes(self.env, actor, n, seed=seed, most=limit, deterministic=False)

@@ -17,7 +17,6 @@ from irl_gym.errors import (
     NotDiscrete,
     NotTabular,
 )
-from irl_gym.learners.base import takes
 from irl_gym.loop.table_world import TableWorld, step_limit
 from irl_gym.loop.worlds import SteppedWorld, World
 from irl_gym.runs.experiment import Experiment
@@ -64,7 +63,7 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
     except (NotTabular, NotDiscrete) as error:
         if not isinstance(env.action_space, spaces.Discrete):
             raise
-        if "mdp" in takes(asked.learner):
+        if "dynamics" in asked.learner.needs.required:
             raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):

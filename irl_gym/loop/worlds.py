@@ -90,7 +90,7 @@ class SteppedWorld:
         finally:
             close(env)
 
-    def tabular(self, reward: TabularReward | LinearReward) -> None:
+    def tabular(self, reward: TabularReward | LinearReward | None) -> None:
         """A reward in the table: there is none."""
 
     def weights(self, reward: TabularReward | LinearReward) -> LinearReward | None:
@@ -102,7 +102,12 @@ class SteppedWorld:
         return reward
 
     def pays(
-        self, reward: TabularReward | LinearReward, observations: Sequence[Any], actions: Sequence[int], *, terminated: bool
+        self,
+        reward: TabularReward | LinearReward | None,
+        observations: Sequence[Any],
+        actions: Sequence[int],
+        *,
+        terminated: bool,
     ) -> tuple[list[int | None], np.ndarray]:
         """No rows of T + 1 observations, and (T,) what a reward of them pays on arrival; NaN of another."""
         known = self.weights(reward)
@@ -133,9 +138,13 @@ class SteppedWorld:
     def seen(self, episodes: list[Episode]) -> None:
         """How often each action was taken in each state: there are no states to count by."""
 
+    def actor(self, policy: Any, seed: int) -> Policy:
+        """A policy that acts on observations, as if it had not acted before."""
+        return _anew(policy, seed)
+
     def chooser(self, policy: Any, seed: int) -> Choose:
         """What acts as in the episodes that judge a policy."""
-        actor = _anew(policy, seed)
+        actor = self.actor(policy, seed)
         return lambda observation: int(np.asarray(actor.predict(observation, deterministic=True)[0]))
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:

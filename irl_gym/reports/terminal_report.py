@@ -18,7 +18,7 @@ from irl_gym.judging import measures
 from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.estimated import errors_told
 from irl_gym.judging.measures import explained, no_score, shown
-from irl_gym.judging.scores import EXPERT, REFERENCES
+from irl_gym.judging.scores import EXPERT, REFERENCES, RETRAINED
 from irl_gym.judging.shares import MUCH, judged, judgements
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.identity import ENVIRONMENT
@@ -46,7 +46,10 @@ def render(report: Report) -> Iterator[RenderableType]:
     yield from _lost(metrics["demonstrations"])
     yield _reward(report.certificate, metrics)
     yield _stages(report.stages, metrics)
-    yield f"Kept in {out}: dataset, reward, certificate, agent, metrics, figures and films."
+    made = (
+        "reward, certificate, agent, metrics, figures" if RETRAINED in metrics["policies"] else "certificate, policy, metrics"
+    )
+    yield f"Kept in {out}: dataset, {made} and films."
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
         yield Text(lost)
@@ -134,7 +137,8 @@ def _table(table: Mapping[str, Any]) -> str:
 
 def _reward(certificate: Mapping[str, Any], metrics: Mapping[str, Any]) -> Table:
     """What the reward says of the expert, what is measured of it, and what its learner proves."""
-    table = Table(title="The recovered reward", title_justify="left", title_style="bold", show_header=False)
+    title = "The recovered reward" if RETRAINED in metrics["policies"] else "What was learned"
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=False)
     table.add_column("what")
     table.add_column("is")
     of_reward, of_program = facts_in(certificate)

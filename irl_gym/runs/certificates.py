@@ -12,7 +12,7 @@ from irl_gym.facts import Fact, facts_of
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
 from irl_gym.files.run_folder import read_json
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.mdp.optimality import Optimality, certify
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.sampling_error import ESTIMATED
@@ -22,16 +22,17 @@ FREQUENT = Fact("judged", "the actions most frequent in its episodes")
 ESTIMATE = Fact("judged on", ESTIMATED, "open")
 
 
-def certificate_of(result: IRLResult, known: tuple[Tabulation, Any] | None, *, episodes: bool) -> dict[str, Any]:
+def certificate_of(result: Outcome, known: tuple[Tabulation, Any] | None, *, episodes: bool) -> dict[str, Any]:
     """What certificate.json holds of a result.
 
     Args:
         result: of any learner.
-        known: the table, and the expert as the learner was given it; None where there is no table.
+        known: the table, and the expert as the learner was given it; None where there is no table. Without a reward there is
+            nothing to say of the expert.
         episodes: is the expert known by its episodes only? Then it may err.
     """
     proof = {**result.proof.to_json(), "facts": [one.to_json() for one in result.facts()]}
-    if known is None:
+    if known is None or result.reward is None:
         return {"optimality": None, "proof": proof}
     table, expert = known
     reward = result.reward.tabular(table.states) if isinstance(result.reward, LinearReward) else result.reward

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from irl_gym.errors import IrlGymError
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.judging.diagnoses.doctor import as_tabular, diagnose, weights_of
+from irl_gym.judging.diagnoses.findings import NO_REWARD
 from irl_gym.judging.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.judging.diagnoses.findings import Finding as Finding
 from irl_gym.programs.status import Status
@@ -24,6 +25,8 @@ def diagnose_run(run: "Run") -> Diagnosis:
     Raises:
         InvalidReward, InvalidPolicy: files that do not belong together.
     """
+    if run.learned is None:
+        return NO_REWARD
     reward, table, claims = run.stages["reward"], run.table, claims_in(run.certificate)
     known = {"claims": claims, "status": Status(reward["status"]), "stats": reward["stats"], "judged": run.metrics}
     without = Case(**known, weights=weights_of(run.learned))

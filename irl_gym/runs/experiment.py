@@ -16,6 +16,7 @@ from irl_gym.agents.planners import Planner
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.endings import AfterEnd, checked_after_end
 from irl_gym.errors import InvalidParameter
+from irl_gym.features.feature_maps import FeatureMap
 from irl_gym.learners.base import Learner
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.rewards import plain_json
@@ -65,7 +66,9 @@ class Experiment:
     episodes: int = 500
     """Demonstrations recorded."""
     learner: Learner = field(default_factory=lambda: FiniteLP(report_lambda_0=True))
-    """Recovers the reward: FiniteLP, FeatureLP or TrajectoryLP."""
+    """Recovers the reward, or learns a policy: FiniteLP, FeatureLP, TrajectoryLP, or one of your own."""
+    features: FeatureMap | None = None
+    """phi of observations, for a learner that has none of its own."""
     inner: Planner | None = None
     """Solves for each reward that TrajectoryLP tries; None for ValueIteration where there is a table, else SB3."""
     shaping: bool = True
@@ -135,7 +138,7 @@ class Experiment:
         return {name: value for name, value in told.items() if name not in LATER or value != LATER[name]}
 
 
-LATER = {"after_end": "refuse", "trust_dataset": False}
+LATER = {"after_end": "refuse", "trust_dataset": False, "features": None}
 """Fields that earlier versions had not, and what these did."""
 MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""

@@ -23,7 +23,6 @@ from irl_gym.tables.tabulate import make
 
 PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
-LearnerName = Literal["finite-lp", "feature-lp", "trajectory-lp"]
 Reveals = Mapping[str, int | Sequence[Any]] | Literal["known"]
 KNOWN: Literal["known"] = "known"
 _ALGORITHMS: dict[str, Algorithm] = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}

@@ -19,7 +19,7 @@ from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
 from irl_gym.files.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
-from irl_gym.judging.curves import Curve, read_curve
+from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
 from irl_gym.judging.diagnoses.plain_words import with_names
 from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
@@ -55,8 +55,8 @@ class Run:
     """(A,) names of the actions."""
     table: Tabulation | None
     """P, d0, gamma, the true reward and the states; None where the environment was stepped."""
-    learned: TabularReward | LinearReward
-    """The recovered reward, of rows or of observations."""
+    learned: TabularReward | LinearReward | None
+    """The recovered reward, of rows or of observations; None of a learner of policies alone."""
     expert: np.ndarray | None
     """(S,) actions, or (S, A) probabilities with rows of NaN where nothing is known; None where there is no table."""
     agent: np.ndarray | None
@@ -175,11 +175,11 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
-        learned=reader.read("reward.npz", load_reward),
+        learned=reader.maybe("reward.npz", load_reward),
         expert=reader.read("expert.npz", load_actions) if on_table else None,
-        agent=reader.read("agent_policy.npz", load_actions) if on_table else None,
+        agent=reader.maybe("agent_policy.npz", load_actions) if on_table else None,
         certificate=reader.read("certificate.json", read_certificate), metrics=metrics,
-        curve=reader.read("learning_curve.csv", read_curve), stages=stages,
+        curve=reader.maybe("learning_curve.csv", read_curve) or NO_CURVE, stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one, Grid))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
                if (path / "films" / f"{name}.json").exists()},

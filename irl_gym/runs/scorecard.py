@@ -14,7 +14,7 @@ from irl_gym.judging import measures
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.estimated import evidence_told
 from irl_gym.judging.measures import JudgedReward, measured
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, Scale
+from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED, Scale
 from irl_gym.judging.shares import GOOD
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import claims_in
@@ -57,7 +57,7 @@ def scorecard(
         "policies": policies,
         **scale_told(scale),
         "reward": reward_told(certificate) | learned_told(records["reward"]) | on_table,
-        "training": {"environment_steps": records["agent"]["environment_steps"], **settled(curve, scale)},
+        "training": {"environment_steps": records["agent"].get("environment_steps", 0), **settled(curve, scale)},
         "table": None if table is None else table_told(table, horizon),
         "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"]),
     }  # fmt: skip
@@ -92,15 +92,21 @@ def how_of(planner: Any) -> str:
     return getattr(planner, "how", f"planned by {type(planner).__name__}")
 
 
+def outcome_of(learner: Any) -> str:
+    """How a learner's policy comes about, by its `how`; of one that has none, by its class's name."""
+    return getattr(learner, "how", f"learned by {type(learner).__name__}")
+
+
 def came_about(config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """How each of the loop's policies came about, by its configuration and the records of its stages."""
-    made, trained = (stages[name].get("how", NOT_RECORDED) for name in ("expert", "agent"))
+    made, learned, trained = (stages[name].get("how", NOT_RECORDED) for name in ("expert", "reward", "agent"))
     n = stages["demonstrations"].get("episodes")
     noise = f", with a random action at probability {config['epsilon']:g}" if config.get("epsilon") else ""
     given = config.get("dataset") is not None
     return {
         EXPERT: f"known by {n:,} episode{'s' * (n != 1)} of the dataset" if given else f"{made}{noise}",
         RANDOM: "uniformly random actions",
+        LEARNED: learned,
         RETRAINED: trained,
     }
 

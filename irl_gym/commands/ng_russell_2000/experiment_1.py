@@ -23,7 +23,7 @@ import scipy.sparse as sp
 
 from irl_gym.commands.ng_russell_2000.records import Check, Progress, at_most, near, reported
 from irl_gym.judging.metrics import optimal_actions
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import Reward, value_iteration
@@ -123,7 +123,7 @@ def _staying(mdp: TabularMDP) -> TabularMDP:
     return TabularMDP(mdp.P + loops, mdp.gamma, mdp.d0)
 
 
-def _grid(result: IRLResult) -> np.ndarray:
+def _grid(result: Outcome) -> np.ndarray:
     """(5, 5) rewards of states."""
     reward: Any = result.reward
     return reward.values.reshape(5, 5)
@@ -141,9 +141,9 @@ class Outcome1:
     """Its table."""
     expert: np.ndarray
     """(25,) actions."""
-    free: IRLResult
+    free: Outcome
     """lambda = 0."""
-    penalised: IRLResult
+    penalised: Outcome
     """lambda = `l1`."""
     lambda_0: float
     """The price above which R = 0."""

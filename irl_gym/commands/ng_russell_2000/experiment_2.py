@@ -26,7 +26,7 @@ import numpy as np
 from irl_gym.commands.ng_russell_2000.driving import Drive, drive
 from irl_gym.commands.ng_russell_2000.records import Check, Progress, at_least, at_most, near, reported
 from irl_gym.features.bases import RadialBasis
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration, tied
@@ -169,7 +169,7 @@ class Fits:
     """Share of cells with several optimal actions."""
     steps: float
     """"reach": the steps that the worst cell takes."""
-    results: tuple[IRLResult, ...]
+    results: tuple[Outcome, ...]
     """n."""
     violated: np.ndarray
     """(n,) share of all cells in which (4) is violated."""

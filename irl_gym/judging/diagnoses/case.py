@@ -14,7 +14,7 @@ import numpy as np
 from irl_gym._typing import ActionSets, Indices, Matrix, Numbers, StateMask, Vector
 from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.judging.metrics import Tie, ties_of, worst_tie
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.proofs.finite_proof import served
 from irl_gym.mdp.margins import Margins, best_margins, least_per_state, margins_of
@@ -289,7 +289,7 @@ class Case:
         return served(self.mdp, self.expert, self.best.reward, self.best.proof)
 
     @cached_property
-    def best(self) -> IRLResult | DegenerateExpert | None:
+    def best(self) -> Outcome | DegenerateExpert | None:
         """What FiniteLP with hard rows and capped margins finds; why there is nothing; None where that is not known."""
         if not (self.small and self.has_expert and self.mdp is not None):
             return None

@@ -19,7 +19,7 @@ from irl_gym.judging.diagnoses.evidence import Evidence, missed, too_little
 from irl_gym.judging.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.judging.diagnoses.findings import Finding as Finding
 from irl_gym.judging.diagnoses.findings import counted
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.spaces.states import States
@@ -65,7 +65,7 @@ CHECKS: Mapping[Callable[[Case], Finding | None], tuple[Evidence, ...]] = {
 
 
 def doctor(
-    result: IRLResult | TabularReward | LinearReward | np.ndarray | None,
+    result: Outcome | TabularReward | LinearReward | np.ndarray | None,
     mdp: TabularMDP | None,
     expert: Any,
     *,
@@ -92,7 +92,7 @@ def doctor(
         InvalidFeatures: features of other observations than the states given.
     """
     mdp = None if mdp is None else checked_mdp(mdp)
-    learned = result if isinstance(result, IRLResult) else None
+    learned = result if isinstance(result, Outcome) else None
     if learned is None and mdp is None:
         what = "None" if result is None else f"a {type(result).__name__}, a reward without a proof,"
         raise InvalidParameter(f"result is {what} and mdp is None: expected a result, a table, or both.")

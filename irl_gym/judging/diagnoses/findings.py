@@ -99,3 +99,7 @@ def named(states: np.ndarray, actions: np.ndarray | None = None) -> str:
     told = [f"s={s}" for s in states] if actions is None else [f"s={s} a={a}" for s, a in zip(states, actions, strict=True)]
     more = len(told) - MOST_NAMED
     return ", ".join(told) if more <= 0 else f"{', '.join(told[:MOST_NAMED])} and {more:,} more"
+
+
+NO_REWARD = Diagnosis((), "", "the learner gives a policy, and no reward to examine")
+"""Of a learner of policies."""

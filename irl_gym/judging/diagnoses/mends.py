@@ -7,7 +7,7 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 
 Mend = tuple[str, tuple[str, ...]]
 """What to do, in words, and its flags."""
@@ -24,7 +24,7 @@ def on_steps(case: Case) -> tuple[str, ...]:
 
 def capped(case: Case) -> Mend | None:
     """FiniteLP's default program, in what differs from the run's own; None where it is the run's own, or may be."""
-    if isinstance(case.best, IRLResult) and case.claims.get("slack") is not None:
+    if isinstance(case.best, Outcome) and case.claims.get("slack") is not None:
         return 'slack=None, with margin_cap="auto" and l1=0.0', ("--slack none", "--margin-cap auto", "--l1 0")
     if "uniform_margin" in case.stats and not case.claims.get("l1"):  # of which "auto" makes the cap
         return None

@@ -6,7 +6,7 @@ from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.judging.diagnoses.findings import Finding, counted, named
 from irl_gym.judging.diagnoses.mends import DEFAULTS, capped, on_steps
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 
 
 def lambda_above_lambda_0(case: Case) -> Finding | None:
@@ -26,7 +26,7 @@ def lambda_above_lambda_0(case: Case) -> Finding | None:
     known = "" if lambda_0 is None else f" lambda_0 is {lambda_0:.6g}."
     number = "" if lambda_0 is None else f" or a number below {lambda_0:.4g}"
     program, flags = capped(case) or ("l1=0.0", ("--l1 0",))
-    solved = ": solved here, it gives the expert margins" if isinstance(case.best, IRLResult) else ""
+    solved = ": solved here, it gives the expert margins" if isinstance(case.best, Outcome) else ""
     return Finding(
         "lambda-above-lambda-0",
         f"The reward is zero because it is too dear: l1 is {l1:.6g}, and above lambda_0 no reward is worth its price.{known}",

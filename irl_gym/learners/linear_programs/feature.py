@@ -35,11 +35,13 @@ from irl_gym.environments.generative import GenerativeModel, least_horizon, trun
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
-from irl_gym.learners.base import IRLResult, check_weighing
+from irl_gym.learners.base import Outcome, check_weighing, featured
 from irl_gym.learners.linear_programs.feature_program import NOTHING, SolvedFeatures, solve_features
 from irl_gym.learners.linear_programs.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
 from irl_gym.learners.linear_programs.proofs.feature_proof import FeatureProof, SampledFeatureProof
 from irl_gym.learners.linear_programs.weights import Weights
+from irl_gym.learners.needs import Needs
+from irl_gym.learners.problem import Problem
 from irl_gym.mdp.margins import least_per_state
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.policies import Policy, completed
@@ -58,8 +60,8 @@ class FeatureLP:
         InvalidFeatures: features that are neither a map nor an array (S, K).
     """
 
-    features: FeatureMap | np.ndarray
-    """phi: a map, or an array (S, K) with one row a state."""
+    features: FeatureMap | np.ndarray | None = None
+    """phi: a map, or an array (S, K) with one row a state; None for those of the problem that `learn` is given."""
     S_0: int | Sequence[int] | Sequence[Sequence[float]] | np.ndarray | None = None
     """The sample: a number of states, drawn uniformly from those that count; the states themselves, as rows of the table or as
     (m, d) states of a generative model; None for all."""
@@ -82,11 +84,12 @@ class FeatureLP:
     Kept within a fifth, as `FiniteLP.time_limit` is; a caller's features are not cut."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
-    takes: ClassVar[tuple[str, ...]] = ("mdp", "known_expert", "states")
+    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), ("features",))
     """What the loop gives `fit`."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "features", as_features(self.features))
+        if self.features is not None:
+            object.__setattr__(self, "features", as_features(self.features))
         check_weighing(self)
         if self.margin_cap is not None and not is_word(self.margin_cap, "auto"):
             checked_number("margin_cap", self.margin_cap, "a number above 0, 'auto' or None", above=0)
@@ -98,9 +101,23 @@ class FeatureLP:
         elif self.S_0 is not None and not float_array("S_0", self.S_0, "states, all of one length", InvalidParameter).size:
             raise InvalidParameter("S_0 is empty: expected at least one state, or None for all.")
 
+    def learn(self, problem: Problem, rng: np.random.Generator | None = None) -> Outcome[LinearReward, FeatureProof]:
+        """The same as `fit`, of a problem; where the expert is known by episodes alone, its most frequent actions are taken.
+
+        Args:
+            problem: with the dynamics, a table or a generative model; the expert's policy, or on a table its episodes; and
+                features, if the learner has none.
+            rng: nothing is drawn from it, but from the learner's own seed.
+
+        Raises:
+            MissingPart: one of these is not there. And whatever `fit` raises.
+        """
+        known, learner = self.needs.of(problem, self), featured(self, problem)
+        return learner.fit(known.dynamics, known.policy, states=known.spaces.states)
+
     def fit(
         self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None
-    ) -> IRLResult[LinearReward, FeatureProof]:
+    ) -> Outcome[LinearReward, FeatureProof]:
         """Learn the weights of a reward under which the expert is optimal, or violates (10) least.
 
         Args:
@@ -137,7 +154,7 @@ class FeatureLP:
 
     def _fit_table(
         self, mdp: TabularMDP, expert: Any, states: States | None, solving: Solving
-    ) -> IRLResult[LinearReward, FeatureProof]:
+    ) -> Outcome[LinearReward, FeatureProof]:
         if states is not None and not isinstance(states, States):
             raise InvalidParameter(
                 f"states is {states!r}: expected a numbering, such as `tabulate(...).states`, or None for rows."
@@ -154,9 +171,9 @@ class FeatureLP:
         found = rows_of_table(mdp, expert, self.phi, decode, chosen, discounted, printed=self.trivial_rows == "as printed")
         solved = solve_features(found, self.penalty, self.l1, self.margin_cap, solving)
         proof = FeatureProof(**self._proved(found, solved))
-        return IRLResult(self._reward(solved.weights), solved.status, proof, self._stats(solved.weights, found))
+        return Outcome(self._reward(solved.weights), solved.status, proof, self._stats(solved.weights, found))
 
-    def _fit_model(self, model: GenerativeModel, expert: Policy, solving: Solving) -> IRLResult[LinearReward, FeatureProof]:
+    def _fit_model(self, model: GenerativeModel, expert: Policy, solving: Solving) -> Outcome[LinearReward, FeatureProof]:
         if not isinstance(expert, Policy):
             raise InvalidPolicy(
                 f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
@@ -194,7 +211,7 @@ class FeatureLP:
             standard_error=error,
         )
         extra = {"horizon": horizon, "truncation_per_unit_of_reward": truncation_bound(model.gamma, horizon)}
-        return IRLResult(self._reward(weights), solved.status, proof, self._stats(weights, found) | extra)
+        return Outcome(self._reward(weights), solved.status, proof, self._stats(weights, found) | extra)
 
     def _states_of(self, model: GenerativeModel) -> np.ndarray:
         """(m, d) S_0 of a generative model."""

@@ -30,14 +30,24 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from irl_gym.checks import checked_number, float_array, is_word
+from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs import programs
 from irl_gym.learners.linear_programs.partial import PartialTask
-from irl_gym.learners.linear_programs.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, Program, RewardOn, Solved
+from irl_gym.learners.linear_programs.programs import (
+    JUST_BELOW,
+    LARGEST_BOUND,
+    NO_MARGIN,
+    Program,
+    RewardOn,
+    Solved,
+    checked_visits,
+)
 from irl_gym.learners.linear_programs.proofs.finite_proof import FiniteProof, prove
-from irl_gym.learners.linear_programs.strict_rows import strict_rows
+from irl_gym.learners.linear_programs.strict_rows import nothing_to_compare, strict_rows
+from irl_gym.learners.needs import Needs
+from irl_gym.learners.problem import Problem
 from irl_gym.mdp.margins import row_margins
 from irl_gym.mdp.optimality_rows import Comparisons, compare
 from irl_gym.mdp.policies import completed
@@ -75,7 +85,7 @@ class FiniteLP:
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
     """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
-    takes: ClassVar[tuple[str, ...]] = ("mdp", "known_expert", "visits")
+    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"))
     """What the loop gives `fit`."""
     of_feasible_set: ClassVar[bool] = True
     """Is the reward one of those that `irl_gym.judging.ambiguity` describes, by how far they reach and how they depend on
@@ -100,7 +110,16 @@ class FiniteLP:
                     "some reward and no row needs slack."
                 )
 
-    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> IRLResult[TabularReward, FiniteProof]:
+    def learn(self, problem: Problem, rng: np.random.Generator | None = None) -> Outcome[TabularReward, FiniteProof]:
+        """`fit`, of a problem: its table, and the expert's policy or what its episodes show most often. Nothing is drawn.
+
+        Raises:
+            MissingPart: one of these is not there. And whatever `fit` raises.
+        """
+        known = self.needs.of(problem, self)
+        return self.fit(checked_mdp(known.dynamics), known.policy, visits=known.visits)
+
+    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> Outcome[TabularReward, FiniteProof]:
         """Learn a reward under which the expert is optimal.
 
         Args:
@@ -123,10 +142,10 @@ class FiniteLP:
 
     def _fit(
         self, mdp: TabularMDP, expert: Any, visits: np.ndarray | None, solving: Solving
-    ) -> IRLResult[TabularReward, FiniteProof]:
+    ) -> Outcome[TabularReward, FiniteProof]:
         known_expert, known = completed(expert, mdp.n_states)
         acting = mdp.reachable & ~mdp.terminal
-        visits = _checked_visits(visits, known & acting)
+        visits = checked_visits(visits, known & acting)
         if self.slack is not None or (acting & ~known).any():
             return PartialTask(self, mdp, known_expert, known, visits, solving).fit()
         task, y_l1 = _Task(self, mdp, known_expert, solving), None
@@ -170,23 +189,6 @@ class FiniteLP:
             return task.lambda_0()
 
 
-def _checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
-    """(S,) visits, above 0 in the states `needed`; None when not given."""
-    if visits is None:
-        return None
-    array = float_array("visits", visits, "(S,) numbers", InvalidParameter)
-    if array.shape != needed.shape:
-        raise InvalidParameter(f"visits has shape {array.shape}: expected ({needed.size},), one number for each state.")
-    wrong = np.flatnonzero(~(array >= 0) | ~np.isfinite(array) | (needed & (array == 0)))
-    if wrong.size:
-        s = wrong[0]
-        raise InvalidParameter(
-            f"visits[s={s}] is {array[s]:g}: expected a number of at least 0, and above it where the expert is known. Where "
-            "nothing is known, the expert's row is NaN."
-        )
-    return array
-
-
 class _Task:
     """One fit: the reachable part of the MDP, the rows of (4), and the states that count."""
 
@@ -200,7 +202,7 @@ class _Task:
         self.counted = self._candidates()
         self.unbreakable = np.zeros_like(self.counted)
         if not self.counted.any():
-            raise self._nothing_to_compare()
+            raise nothing_to_compare(self.comparisons, self.part)
 
     def _candidates(self) -> np.ndarray:
         """(n,) rows that can have a margin: in the paper's LP a trivial row takes it from all rows of its state."""
@@ -263,24 +265,6 @@ class _Task:
         prices = np.bincount(self.comparisons.states[self.counted], np.maximum(y[self.counted], 0))
         return 1 / max(float(prices.max()), 1e-300)
 
-    def _nothing_to_compare(self) -> DegenerateExpert:
-        c, where = self.comparisons, f"the {self.rows.size} reachable states"
-        if self.part.terminal.all():
-            return DegenerateExpert(
-                "every start is terminal, so no action is ever taken: expected an episode of a step at least."
-            )
-        if c.equal.all():
-            return DegenerateExpert(f"the expert takes every action in each of {where}: expected one that it leaves out.")
-        if (c.equal | c.trivial).all():
-            return DegenerateExpert(
-                f"none of {where} compares the expert with an action of other successors: every reward on states makes it "
-                f'optimal. Use reward_on="state-action".{c.caveat}'
-            )
-        return DegenerateExpert(
-            f"each of {where} has an action with the expert's own successors, which takes its margin in the paper's LP. Use "
-            'margin_cap="auto", which leaves such rows out.'
-        )
-
     def degenerate(self) -> DegenerateExpert:
         where = "state reward" if self.learner.reward_on == "state" else "reward"
         mend = ' Use reward_on="state-action".' if self.learner.reward_on == "state" else ""
@@ -290,7 +274,7 @@ class _Task:
             f"{self.comparisons.caveat if self.learner.reward_on == 'state' else ''}"
         )
 
-    def result(self, solved: Solved, **proof: Any) -> IRLResult[TabularReward, FiniteProof]:
+    def result(self, solved: Solved, **proof: Any) -> Outcome[TabularReward, FiniteProof]:
         values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
         if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
             values[self.rows] = solved.R
@@ -298,4 +282,4 @@ class _Task:
         never = self.comparisons.pairs(self.rows, np.flatnonzero(self.unbreakable))
         terms = {"r_max": self.learner.r_max, "unbreakable_rows": never, **proof}
         found = prove(self.part, self.comparisons, reward.of_rows(self.rows), self.counted, **terms)
-        return IRLResult(reward, Status.ZERO if found.zero else solved.answer.status, found, self.stats)
+        return Outcome(reward, Status.ZERO if found.zero else solved.answer.status, found, self.stats)

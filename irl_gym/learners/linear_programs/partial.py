@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverInfeasible
-from irl_gym.learners.base import IRLResult
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.programs import JUST_BELOW, LARGEST_BOUND, NO_MARGIN, RewardOn
 from irl_gym.learners.linear_programs.proofs.finite_proof import FiniteProof
 from irl_gym.learners.linear_programs.proofs.soft_proof import Terms, prove_partly
@@ -129,7 +129,7 @@ class PartialTask:
         learner = self.learner
         return SoftProgram(self.partly, learner.reward_on, self.counted, learner.slack if soft else None, self.solving)
 
-    def fit(self) -> IRLResult[TabularReward, FiniteProof]:
+    def fit(self) -> Outcome[TabularReward, FiniteProof]:
         """Learn the reward."""
         learner, r_max = self.learner, self.learner.r_max
         cap, need = self.settle()
@@ -286,7 +286,7 @@ class PartialTask:
 
     def _result(
         self, found: Found, unit: float, bound: float, terms: Terms, lambda_0: float | None
-    ) -> IRLResult[TabularReward, FiniteProof]:
+    ) -> Outcome[TabularReward, FiniteProof]:
         learner = self.learner
         values = np.zeros((self.mdp.n_states, *found.R.shape[1:]))
         if np.abs(found.R).max() * unit > NO_MARGIN * learner.r_max:
@@ -296,4 +296,4 @@ class PartialTask:
         proof = prove_partly(self.partly, self.rows, reward, terms, bound=bound, lambda_0=lambda_0)
         if terms.l1 == 0 and proof.objective <= NO_MARGIN * min(learner.r_max, terms.cap or np.inf):
             raise self.degenerate()
-        return IRLResult(reward, Status.ZERO if proof.zero else found.answer.status, proof, self.stats)
+        return Outcome(reward, Status.ZERO if proof.zero else found.answer.status, proof, self.stats)

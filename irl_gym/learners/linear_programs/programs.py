@@ -18,6 +18,8 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
+from irl_gym.checks import float_array
+from irl_gym.errors import InvalidParameter
 from irl_gym.mdp.optimality_rows import Comparisons
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.solvers import Answer, Solving, solve
@@ -182,3 +184,24 @@ def sparsest(program: Program, r_max: float, margin: float) -> Solved:
     program.bounded(r_max / margin)
     solved = program.solve(cp.Minimize(program.l1()), 1.0)
     return Solved(np.clip(solved.R * margin, -r_max, r_max), solved.y, solved.answer)
+
+
+def checked_visits(visits: Any, needed: np.ndarray) -> np.ndarray | None:
+    """(S,) visits, above 0 in the states `needed`; None when not given.
+
+    Raises:
+        InvalidParameter: of the wrong shape, or 0 where they are needed.
+    """
+    if visits is None:
+        return None
+    array = float_array("visits", visits, "(S,) numbers", InvalidParameter)
+    if array.shape != needed.shape:
+        raise InvalidParameter(f"visits has shape {array.shape}: expected ({needed.size},), one number for each state.")
+    wrong = np.flatnonzero(~(array >= 0) | ~np.isfinite(array) | (needed & (array == 0)))
+    if wrong.size:
+        s = wrong[0]
+        raise InvalidParameter(
+            f"visits[s={s}] is {array[s]:g}: expected a number of at least 0, and above it where the expert is known. Where "
+            "nothing is known, the expert's row is NaN."
+        )
+    return array

@@ -10,6 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from irl_gym.errors import DegenerateExpert
+from irl_gym.mdp.optimality_rows import Comparisons
+from irl_gym.mdp.tabular_mdp import TabularMDP
+
 SERVED = 0.5
 """A row whose margin comes to this, where 1 is asked for, is strict."""
 
@@ -32,3 +36,21 @@ def strict_rows(states: np.ndarray, wanted: np.ndarray, serve: Callable[[np.ndar
         found |= wanted & (serve(asked) > SERVED)
         left &= ~(found | asked)
     return found
+
+
+def nothing_to_compare(c: Comparisons, part: TabularMDP) -> DegenerateExpert:
+    """Why no row of (4) among the reachable states can have a margin, as an error."""
+    where = f"the {part.n_states} reachable states"
+    if part.terminal.all():
+        return DegenerateExpert("every start is terminal, so no action is ever taken: expected an episode of a step at least.")
+    if c.equal.all():
+        return DegenerateExpert(f"the expert takes every action in each of {where}: expected one that it leaves out.")
+    if (c.equal | c.trivial).all():
+        return DegenerateExpert(
+            f"none of {where} compares the expert with an action of other successors: every reward on states makes it "
+            f'optimal. Use reward_on="state-action".{c.caveat}'
+        )
+    return DegenerateExpert(
+        f"each of {where} has an action with the expert's own successors, which takes its margin in the paper's LP. Use "
+        'margin_cap="auto", which leaves such rows out.'
+    )

@@ -17,7 +17,7 @@ Axes: N episodes, K features.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, Protocol, runtime_checkable
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -27,36 +27,16 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features.feature_maps import FeatureMap, as_features, checked_features
 from irl_gym.features.feature_sums import discounted_sums
 from irl_gym.features.linear_reward import LinearReward
-from irl_gym.learners.base import IRLResult, check_weighing
+from irl_gym.learners.base import Outcome, check_weighing, featured
 from irl_gym.learners.linear_programs.estimates import Estimate, nearest, usable
 from irl_gym.learners.linear_programs.expressible import uniform_margin
 from irl_gym.learners.linear_programs.proofs.trajectory_proof import TrajectoryProof
 from irl_gym.learners.linear_programs.weights import Rows, Weights, best_weights
+from irl_gym.learners.needs import Needs
+from irl_gym.learners.problem import Problem, World
 from irl_gym.mdp.episodes import Episode
-from irl_gym.mdp.policies import Policy
 from irl_gym.programs.killable import within
 from irl_gym.programs.solvers import SolverName, Solving, Status
-
-
-@runtime_checkable
-class World(Protocol):
-    """A world that can be run and solved for a reward; `irl_gym.agents.simulator.Simulator` is one.
-
-    It may have a `limit`, the steps after which it cuts episodes.
-    """
-
-    @property
-    def gamma(self) -> float:
-        """Discount."""
-        ...
-
-    def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
-        """A policy for a reward of observations."""
-        ...
-
-    def sums(self, policy: Policy | None, features: FeatureMap, n: int, *, horizon: int, seed: int) -> np.ndarray:
-        """(N, K) sum_t gamma^t phi(s_t) of n episodes of a policy, random if None, cut after `horizon` steps."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +48,9 @@ class TrajectoryLP:
         InvalidFeatures: features that are neither a map nor an array (S, K).
     """
 
-    features: FeatureMap | np.ndarray
-    """phi of observations: a map, or an array (S, K) where these are integers."""
+    features: FeatureMap | np.ndarray | None = None
+    """phi of observations: a map, or an array (S, K) where these are integers; None for those of the problem that `learn` is
+    given."""
     trajectories: int = 1_000
     """m, run for each policy."""
     horizon: int | None = None
@@ -94,11 +75,12 @@ class TrajectoryLP:
     time_limit: float | None = None
     """Seconds for the whole fit: its programs, all attempts at them, planning by value iteration and trajectories; None for
     no limit. An agent's training is not cut: the time is up when the next program would begin."""
-    takes: ClassVar[tuple[str, ...]] = ("simulator", "demonstrations")
+    needs: ClassVar[Needs] = Needs(("environment", "demonstrations"), ("features",))
     """What the loop gives `fit`."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "features", as_features(self.features))
+        if self.features is not None:
+            object.__setattr__(self, "features", as_features(self.features))
         check_weighing(self)
         if self.gap_cap is not None and not is_word(self.gap_cap, "auto"):
             raise InvalidParameter(f"gap_cap is {self.gap_cap!r}: expected 'auto' or None.")
@@ -110,7 +92,20 @@ class TrajectoryLP:
         """The features, as a map."""
         return as_features(self.features)
 
-    def fit(self, world: World, episodes: Iterable[Episode], /) -> IRLResult[LinearReward, TrajectoryProof]:
+    def learn(self, problem: Problem, rng: np.random.Generator | None = None) -> Outcome[LinearReward, TrajectoryProof]:
+        """The same as `fit`, of a problem.
+
+        Args:
+            problem: with an environment, episodes, and features if the learner has none.
+            rng: nothing is drawn from it, but from the learner's own seed.
+
+        Raises:
+            MissingPart: one of these is not there. And whatever `fit` raises.
+        """
+        known, learner = self.needs.of(problem, self), featured(self, problem)
+        return learner.fit(known.environment, known.demonstrations)
+
+    def fit(self, world: World, episodes: Iterable[Episode], /) -> Outcome[LinearReward, TrajectoryProof]:
         """The best round: the one whose policy is nearest to the expert in the features.
 
         Stops after `max_rounds`, when `patience` rounds have not come nearer, or when a policy cannot be told from the expert:
@@ -126,7 +121,7 @@ class TrajectoryLP:
             InvalidFeatures: what the features give is not (N, K) finite numbers.
             SolverTimeout, SolverFailed: no answer.
         """
-        results: list[IRLResult[LinearReward, TrajectoryProof]] = []
+        results: list[Outcome[LinearReward, TrajectoryProof]] = []
         best = 0
         for result in self.iterate(world, episodes):
             results.append(result)
@@ -138,7 +133,7 @@ class TrajectoryLP:
         stats = {**results[best].stats, "best_round": best + 1, "best_by": "distance", "rounds": history}
         return replace(results[best], proof=replace(results[best].proof, rounds=len(results)), stats=stats)
 
-    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[IRLResult[LinearReward, TrajectoryProof]]:
+    def iterate(self, world: World, episodes: Iterable[Episode], /) -> Iterator[Outcome[LinearReward, TrajectoryProof]]:
         """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
         if not isinstance(world, World):
             raise InvalidParameter(
@@ -172,7 +167,7 @@ class TrajectoryLP:
                 "expert_episodes": len(expert.episodes),
                 "episodes_dropped": expert.dropped,
             }
-            yield IRLResult(reward, status, proof, stats, policy)
+            yield Outcome(reward, status, proof, stats, policy)
             found.append(newest)
 
     def _largest(self, expert: list[Episode]) -> float:

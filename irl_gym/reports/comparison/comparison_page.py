@@ -137,7 +137,8 @@ def _numbers(metrics: Mapping[str, Any], *, recomputed: bool) -> Iterator[tuple[
         yield f"how it came about, {called(name)}", how(policies[name])
     yield from ((one.heading, one.text(reward)) for one in shown(measures.REWARDS, [reward]))
     whose = "" if recomputed else ", as recorded"
-    yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
+    if "expert_optimal" in reward:
+        yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
     if policies[agent_of(policies)]["score"] is not None:
         steps = metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
@@ -149,6 +150,8 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
     places = run_places(named)
     for letter, run in named.items():
         scene = scenes[letter]
+        if run.learned is None:
+            continue
         if scene is None:
             section = compared.weights(run.learned)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]

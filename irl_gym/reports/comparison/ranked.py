@@ -94,7 +94,7 @@ def learning(named: Mapping[str, Run]) -> Section:
     """All learning curves in one figure."""
     trained = {letter: run for letter, run in named.items() if len(run.curve.steps)}
     if not trained:
-        return Section("learning", TITLE, "The agents were planned exactly, not trained.")
+        return Section("learning", TITLE, "No agent was trained step by step.")
     if one_world(named):
         series = {f"run {letter}": (run.curve.steps, run.curve.value, None) for letter, run in trained.items()}
         levels = levels_of({f"run {letter}": {letter: run} for letter, run in trained.items()})

@@ -44,7 +44,7 @@ def test_a_reward_that_is_not_finite_is_named(value):
 
 def test_a_result_is_told_from_its_reward(unchecked):
     result = FiniteLP().fit(MDP, MODEL.expert)
-    with pytest.raises(InvalidReward, match="the second reward is an IRLResult, which holds a reward: pass its"):
+    with pytest.raises(InvalidReward, match="the second reward is an Outcome, which holds a reward: pass its"):
         epic(MDP, R, result)
 
 

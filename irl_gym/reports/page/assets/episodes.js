@@ -55,7 +55,7 @@
   function sentence(moment, at, last) {
     const where = `Step ${at} of ${last}: ${moment.text}`;
     if (at === 0) return `Step 0 of ${last}, the start: ${moment.text}.`;
-    return `${where}, after ${moment.action}. Paid ${moment.pay}, ${moment.total} so far; by the learned reward ${moment.learned}, ${moment.learnedTotal} so far.`;
+    return `${where}, after ${moment.action}. Paid ${moment.pay}, ${moment.total} so far${moment.learnedTotal && `; by the learned reward ${moment.learned}, ${moment.learnedTotal} so far`}.`;
   }
 
   function play(film) {
@@ -121,8 +121,10 @@
     });
     steps.addEventListener("toggle", () => {
       if (!steps.open || steps.querySelector("table")) return;
-      const rows = moments.map((one, i) => [String(i), one.action, one.text, one.pay, one.total, one.learned, one.learnedTotal]);
-      const headings = ["step", "action", "leads to", "true reward", "so far", "learned reward", "so far"];
+      const paid = moments.some((one) => one.learnedTotal); // there is no learned reward of a learner of policies
+      const rows = moments.map((one, i) =>
+        [String(i), one.action, one.text, one.pay, one.total, one.learned, one.learnedTotal].slice(0, paid ? 7 : 5));
+      const headings = ["step", "action", "leads to", "true reward", "so far", "learned reward", "so far"].slice(0, paid ? 7 : 5);
       steps.querySelector(".scroll").append(tableOf(`Steps of the ${title.toLowerCase()}`, headings, rows));
       mark();
     });

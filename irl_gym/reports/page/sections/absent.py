@@ -28,7 +28,7 @@ class Lack(NamedTuple):
 
 
 LACKS: Mapping[str, Lack] = {
-    "curve": Lack(LEARNING, "The agent was planned exactly, not trained, so it has no learning curve."),
+    "curve": Lack(LEARNING, "No agent was trained step by step, so there is no learning curve."),
     "films": Lack(EPISODES, "No episode of this run was filmed."),
     "lambda_path": Lack(
         LAMBDA, "How the reward changes with lambda, the price of its norm, was not worked out for this run.",

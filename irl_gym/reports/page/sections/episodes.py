@@ -8,6 +8,7 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
+from irl_gym.judging.scores import RETRAINED
 from irl_gym.reports.page.maps import Map, geometry
 from irl_gym.reports.page.sections.absent import EPISODES
 from irl_gym.reports.page.sections.section import Section
@@ -22,7 +23,7 @@ ENDS = {
 }
 
 
-def episodes(films: Mapping[str, Film], place: Map | None) -> Section:
+def episodes(films: Mapping[str, Film], place: Map | None, policies: Mapping[str, Any]) -> Section:
     """Films to be played, over the map where they have no pictures."""
     players = []
     for name, film in films.items():
@@ -40,19 +41,17 @@ def episodes(films: Mapping[str, Film], place: Map | None) -> Section:
         "One episode of each, from the same kind of start. Play them, or step with the buttons; the slider below each goes to "
         "any moment."
     )
-    told = [_told(name, film) for name, film in films.items()]
+    titles = TITLES if RETRAINED in policies else TITLES | {"agent": "The learner's policy"}
+    told = [_told(name, titles.get(name, name), film) for name, film in films.items()]
     return Section(*EPISODES, lead, (), "episodes", {"players": told}, {"episodes": {"players": players}})
 
 
-def _told(name: str, film: Film) -> dict[str, Any]:
+def _told(name: str, title: str, film: Film) -> dict[str, Any]:
     """The words around a player."""
     last, steps = film.steps[-1], len(film.steps) - 1
-    title = TITLES.get(name, name)
     seed = "" if film.seed is None else f" Reset with seed {film.seed}."
-    said = (
-        f"{counted(steps, 'step')}, true return {sum_of(last.true_total)}, return under the learned reward "
-        f"{sum_of(last.learned_total)}. {ENDS.get(film.ends, '')}{seed}"
-    )
+    learned = f", return under the learned reward {sum_of(last.learned_total)}" if _paid(film) else ""
+    said = f"{counted(steps, 'step')}, true return {sum_of(last.true_total)}{learned}. {ENDS.get(film.ends, '')}{seed}"
     return {
         "name": name,
         "title": title,
@@ -60,6 +59,11 @@ def _told(name: str, film: Film) -> dict[str, Any]:
         "last": steps,
         "why": sentence_of(film.without_frames),
     }
+
+
+def _paid(film: Film) -> bool:
+    """Is there a learned reward, and does it pay any step that is known?"""
+    return any(one.learned_reward is not None for one in film.steps)
 
 
 def _pictures(film: Film) -> tuple[list[str], int]:
@@ -78,7 +82,7 @@ def _moment(moment: Moment, film: Film, every: int, place: Map | None) -> dict[s
         "pay": "" if moment.true_reward is None else sum_of(moment.true_reward),
         "learned": "" if moment.learned_reward is None else sum_of(moment.learned_reward, 3),
         "total": sum_of(moment.true_total),
-        "learnedTotal": sum_of(moment.learned_total, 3),
+        "learnedTotal": sum_of(moment.learned_total, 3) if _paid(film) else "",
     }
     if film.frames and moment.frame is not None:
         told["picture"] = moment.frame // every

@@ -26,7 +26,9 @@ def proved(certificate: Mapping[str, Any], recomputed: bool, table: Tabulation |
         {"title": f"Of its program: {whence(False)}", "lines": [(one.label, one.sentence) for one in of_program]},
     ]
     lead = "What the reward says of the expert, from the table, the expert and the reward alone, and what its learner proves."
-    if table is None:
+    if table is not None and not of_reward:
+        lead = "What the learner proves of the policy that it gives."
+    elif table is None:
         lead = "What the learner proves, from the sampled trajectories and the reward alone. Without a table there is no more."
     shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}
     return Section("certificate", "Certificate", f"{lead} No solver's word is taken.", (), "certificate", shown)

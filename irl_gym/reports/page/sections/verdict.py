@@ -58,6 +58,8 @@ def verdict(metrics: Mapping[str, Any], *, recomputed: bool) -> dict[str, Any]:
             "note": _returns(metrics),
             "mood": mood,
         },
+    ]
+    of_reward = [
         {
             "label": "lost by the worst tie",
             "value": "not known" if share is None else percent(max(share, 0.0)),
@@ -74,7 +76,7 @@ def verdict(metrics: Mapping[str, Any], *, recomputed: bool) -> dict[str, Any]:
     told = judgements(metrics["policies"], metrics.get("table"))
     return {
         "sentence": _sentence(metrics, score, share, optimal, recomputed),
-        "figures": figures,
+        "figures": [*figures, *(of_reward if _judged(reward) else [])],
         "judged": f"How score and mean return are coloured: {told}",
     }
 
@@ -140,11 +142,18 @@ def _sentence(
         if share > 1e-9
         else "; every policy that is best under that reward is as good as the expert"
     )
-    certified = "whether the expert is optimal under it is undecided"
+    certified = "; whether the expert is optimal under it is undecided"
     if optimal is not None:
-        certified = "the expert is optimal under it" if optimal else "the expert is not optimal under it"
+        certified = f"; the expert is {'' if optimal else 'not '}optimal under it"
     certified += "" if recomputed else ", by the run's own record"
-    return f"{earned}{tie}; {certified}.{_beside(metrics)}{_counted(metrics, agent)}"
+    if not _judged(metrics["reward"]):
+        certified = ""
+    return f"{earned}{tie}{certified}.{_beside(metrics)}{_counted(metrics, agent)}"
+
+
+def _judged(reward: Mapping[str, Any]) -> bool:
+    """Was there a reward, under which the expert was judged? Some learners give a policy alone."""
+    return "expert_optimal" in reward
 
 
 def _who(metrics: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from irl_gym.reports.page.sections.absent import LACKS
 
 WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths")}}
 WITHOUT = {
-    "curve": ({"curve": NO_CURVE}, "learning", "was planned exactly, not trained"),
+    "curve": ({"curve": NO_CURVE}, "learning", "No agent was trained step by step"),
     "films": ({"films": {}}, "episodes", "No episode of this run was filmed."),
     "lambda_path": ({"lambda_path": None}, "lambda", "was not worked out for this run. Of no_path."),
     "widths": ({"widths": None}, "widths", "was not worked out for this run. Of no_widths."),

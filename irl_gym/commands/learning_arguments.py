@@ -1,0 +1,102 @@
+"""What the loop's command line asks for of learners: which one, and its options; an option of another one is refused."""
+
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, Literal, cast
+
+import gymnasium as gym
+
+from irl_gym.commands.terminal import UNSET
+from irl_gym.errors import InvalidParameter
+from irl_gym.features.feature_maps import FeatureMap
+from irl_gym.learners.linear_programs.feature import FeatureLP
+from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.runs.named_parts import FeatureName, PlannerName, features_named
+
+
+@dataclass(frozen=True)
+class Learning:
+    """How the reward is recovered."""
+
+    learner: str = "finite-lp"
+    """Ng & Russell's section 3 (finite-lp), 4 (feature-lp) or 5 (trajectory-lp); or module:Class of your own."""
+    options: Annotated[tuple[str, ...], UNSET] = ()
+    """Of a learner of your own: name=value ..., or one json object."""
+    l1: float | Literal["auto"] = 0.0
+    """Price of ||R||_1, of ||alpha||_1 with features: a number, or auto for just below lambda_0 (finite-lp)."""
+    margin_cap: float | Literal["auto", "none"] = "auto"
+    """finite-lp and feature-lp. Cap on margins: a number, auto, or none for the paper's own program."""
+    slack: float | Literal["auto", "none"] = "auto"
+    """finite-lp. Price of a violation, where a margin is worth 1; none: not at any price. auto: 1 for an expert of episodes."""
+    reward_on: Literal["state", "state-action"] = "state"
+    """finite-lp. What the recovered reward is a function of."""
+    features: FeatureName = "auto"
+    """feature-lp and trajectory-lp. auto is one-hot for discrete observations, radial for others."""
+    size: Annotated[int | None, UNSET] = None
+    """Of the features: centres along each coordinate, Fourier order, or degree."""
+    coordinates: Annotated[tuple[int, ...], UNSET] = ()
+    """Values of each coordinate that a discrete observation is made of, such as 5 5 5 4 for Taxi."""
+    sample: Annotated[int | None, UNSET] = None
+    """feature-lp. States in S_0, drawn at random; the default is all."""
+    rounds: Annotated[int | None, UNSET] = None
+    """trajectory-lp. At most; the default is 30 on tables, 8 on environments that are stepped."""
+    gap_cap: Literal["auto", "none"] = "none"
+    """trajectory-lp. auto lets no policy that is far worse than the expert outweigh the others."""
+    inner: Annotated[PlannerName | None, UNSET] = None
+    """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
+    time_limit: Annotated[float | None, UNSET] = None
+    """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
+
+    def check(self) -> None:
+        """Check that no option is given which the learner does not have.
+
+        Raises:
+            InvalidParameter: one that only others have.
+        """
+        taken = TAKEN.get(self.learner, TAKEN_BY_OWN)
+        for one in fields(self):
+            if one.name not in ("learner", *taken) and getattr(self, one.name) != one.default:
+                flag, whose = one.name.replace("_", "-"), [name for name, names in TAKEN.items() if one.name in names]
+                expected = " or ".join(whose) or "module:Class of your own"
+                raise InvalidParameter(
+                    f"--{flag} is {getattr(self, one.name)!r:.60}, but the learner is {self.learner}, which has no such "
+                    f"option: expected {expected} with it. Leave it out."
+                )
+
+    def phi(self, env: gym.Env) -> FeatureMap:
+        """The features that are asked for."""
+        return features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
+
+    @property
+    def cap(self) -> float | Literal["auto"] | None:
+        """The margin cap as learners take it."""
+        return None if self.margin_cap == "none" else self.margin_cap
+
+    def finite(self, from_episodes: bool) -> FiniteLP:
+        """The learner of section 3."""
+        slack = 1.0 if from_episodes and self.reward_on == "state" else None
+        if self.slack != "auto":
+            slack = None if self.slack == "none" else self.slack
+        return FiniteLP(
+            l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack,
+            time_limit=self.time_limit,
+        )  # fmt: skip
+
+    def linear(self, env: gym.Env, control: bool, seed: int) -> FeatureLP | TrajectoryLP:
+        """The learner of section 4 or 5."""
+        phi, l1 = self.phi(env), cast("Any", self.l1)
+        if self.learner == "feature-lp":
+            return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed, time_limit=self.time_limit)
+        rounds = self.rounds if self.rounds is not None else 8 if control else 30
+        gap_cap = "auto" if self.gap_cap == "auto" else None
+        return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed, time_limit=self.time_limit)
+
+
+TAKEN = {
+    "finite-lp": ("l1", "margin_cap", "slack", "reward_on", "time_limit"),
+    "feature-lp": ("l1", "margin_cap", "features", "size", "coordinates", "sample", "time_limit"),
+    "trajectory-lp": ("l1", "features", "size", "coordinates", "rounds", "gap_cap", "inner", "time_limit"),
+}
+"""The options that each learner has; another is refused, not ignored."""
+TAKEN_BY_OWN = ("options", "features", "size", "coordinates", "inner")
+"""Those of a learner of the user's own; its features are the problem's."""

@@ -1,0 +1,118 @@
+"""What a learner has to be given: Table 1 of the lecture notes (2.1.3) as a declaration.
+
+    variable                     passive    active     interactive      part of a `Problem`
+    demonstrations D*            yes        yes        optional         demonstrations; or the expert, whose policy is all
+    environment, dynamics T      no         yes        yes              environment, dynamics
+    oracle pi*                   no         no         yes              oracle
+    reward R                     no         optional   optional         reward
+Who needs an oracle is interactive, who needs an environment or its dynamics active, who needs neither passive.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+from irl_gym.errors import InvalidParameter, MissingPart
+from irl_gym.learners.problem import Problem
+
+Column = Literal["passive", "active", "interactive"]
+Part = Literal[
+    "demonstrations", "expert", "environment", "oracle", "dynamics", "reward", "features", "gamma", "horizon", "also"
+]
+PARTS: tuple[str, ...] = get_args(Part)
+OR = " or "
+
+TO_GET = {
+    "demonstrations": "the expert's episodes, such as `read_minari(id)` or `collect(env, policy, n)` gives",
+    "expert": "the expert's policy, such as `value_iteration(mdp, reward).policy`",
+    "environment": "a world that can be run and solved, such as `Simulator(env, SB3(), gamma)`",
+    "oracle": "somebody who answers what the expert does, such as `Oracle(policy)`",
+    "dynamics": "a table, such as `tabulate(env, gamma=0.99).mdp`, or a `GenerativeModel(env, gamma)`",
+    "reward": "the true reward, such as `tabulate(env, gamma=0.99).reward`",
+    "features": "phi of observations, such as `RadialBasis.grid(low, high, 5)`",
+    "gamma": "a discount between 0 and 1",
+    "horizon": "a number of steps",
+    "also": "further problems that share the reward",
+}
+"""What each part is, and how it is had."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """The parts of a `Problem` that a learner reads; what is not named here it does not look at.
+
+    Raises:
+        InvalidParameter: a word that is no part of a problem, or a part that is named twice.
+    """
+
+    required: tuple[str, ...]
+    """Parts without which nothing is learned; of "expert or demonstrations" one is enough, the first that there is is read."""
+    optional: tuple[str, ...] = ()
+    """Parts that are read where there are some."""
+
+    def __post_init__(self) -> None:
+        for one in self.parts:
+            if one not in PARTS:
+                raise InvalidParameter(f"a learner needs {one!r}: expected one of {', '.join(PARTS)}, or two joined by 'or'.")
+            if self.parts.count(one) > 1:
+                raise InvalidParameter(f"a learner needs {one!r} twice: expected each part once.")
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """All parts that are read, where they are there."""
+        return (*(one for part in self.required for one in part.split(OR)), *self.optional)
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Parts that are never looked at."""
+        return tuple(one for one in PARTS if one not in self.parts)
+
+    @property
+    def column(self) -> Column:
+        """The learner's column of Table 1."""
+        if "oracle" in self.required:
+            return "interactive"
+        asked = [{*part.split(OR)} for part in self.required]
+        return "active" if any(part <= {"environment", "dynamics"} for part in asked) else "passive"
+
+    def worked_out(self, parts: Mapping[str, Callable[[], Any]]) -> dict[str, Any]:
+        """What a learner reads, by name, where parts cost something: of two of which one is enough no more than one.
+
+        Args:
+            parts: by name, how each is had; None where it is not there.
+        """
+        found: dict[str, Any] = {}
+        for part in (*self.required, *self.optional):
+            for one in part.split(OR):
+                found[one] = parts[one]()
+                if found[one] is not None:
+                    break
+        return found
+
+    def of(self, problem: Problem, learner: Any) -> Problem:
+        """The problem without the parts that are unused.
+
+        Args:
+            problem: what is known.
+            learner: who needs it, for the error.
+
+        Raises:
+            MissingPart: it lacks a part that is required.
+        """
+        given = {one for one in PARTS if not _absent(getattr(problem, one))} | ({"gamma"} if problem.discount else set())
+        for part in self.required:
+            if given.isdisjoint(part.split(OR)):
+                how = "; or ".join(TO_GET[one] for one in part.split(OR))
+                raise MissingPart(
+                    f"{type(learner).__name__} needs {part}, and the problem has {_listed(given)}: expected {how}."
+                )
+        kept = {} if "gamma" in self.unused else {"gamma": problem.discount}
+        return replace(problem, **{one: () if one == "also" else None for one in self.unused}, **kept)
+
+
+def _absent(part: Any) -> bool:
+    return part is None or (isinstance(part, tuple) and not part)
+
+
+def _listed(given: set[str]) -> str:
+    return ", ".join(one for one in PARTS if one in given) or "nothing but spaces"

@@ -1,0 +1,176 @@
+"""What is known of an expert and a world: A_IL: <D*, pi*, T, R> -> pi (lecture notes 2.1.2), each part optional.
+
+    demonstrations   D*, the expert's episodes
+    expert           its policy, known in advance: the complete policy of Ng & Russell's section 3, NaN where it is not known
+    oracle           pi* that may be asked, and counts how often
+    environment      a world that can be run; with a planner, solved for a reward
+    dynamics         T: a table, or a generative model
+    reward           R, where it is known
+    features         phi, of which the reward is to be made
+    spaces           how observations and actions are numbered: always there
+Which learner needs which, and in which column of Table 1 that puts it, is declared in `irl_gym.learners.needs`.
+Axes: S states, A actions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from gymnasium import spaces
+
+from irl_gym._typing import Vector
+from irl_gym.checks import checked_number
+from irl_gym.demonstrations.demonstrated import most_frequent, visits
+from irl_gym.environments.generative import GenerativeModel
+from irl_gym.errors import InvalidParameter
+from irl_gym.features.feature_maps import FeatureMap
+from irl_gym.features.linear_reward import LinearReward
+from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
+from irl_gym.mdp.policies import Policy
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount
+from irl_gym.spaces.states import StateIndex, States
+from irl_gym.tables.tabulation import Tabulation
+
+
+@runtime_checkable
+class World(Protocol):
+    """A world that can be run and solved for a reward; `irl_gym.agents.simulator.Simulator` is one.
+
+    It may have a `limit`, the steps after which it cuts episodes.
+    """
+
+    @property
+    def gamma(self) -> float:
+        """Discount."""
+        ...
+
+    def plan(self, reward: LinearReward, *, seed: int = 0) -> Policy:
+        """A policy for a reward of observations."""
+        ...
+
+    def sums(self, policy: Policy | None, features: FeatureMap, n: int, *, horizon: int, seed: int) -> np.ndarray:
+        """(N, K) sum_t gamma^t phi(s_t) of n episodes of a policy, random if None, cut after `horizon` steps."""
+        ...
+
+
+class Oracle:
+    """An expert that can be asked, observation by observation; it counts its answers.
+
+    Args:
+        policy: what answers.
+    """
+
+    def __init__(self, policy: Policy):
+        if not isinstance(policy, Policy):
+            raise InvalidParameter(
+                f"the oracle's policy is a {type(policy).__name__}: expected one with `predict`. A table of actions is one as "
+                "`TabularPolicy(actions, states)`."
+            )
+        self.policy, self.queries = policy, 0
+
+    def ask(self, observation: Any) -> int:
+        """What the expert does, deterministically; one query more."""
+        self.queries += 1
+        return int(self.policy.predict(observation, deterministic=True)[0])
+
+
+@dataclass(frozen=True)
+class Spaces:
+    """How observations and actions are numbered."""
+
+    observations: spaces.Space
+    """What is observed."""
+    actions: spaces.Space
+    """What can be done."""
+    states: States | None = None
+    """Turns observations into rows of a table; None where there is no table, or observations are its rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is known of an expert and a world.
+
+    Raises:
+        InvalidParameter: parts of another table, or discounts that differ.
+        InvalidDiscount: gamma outside (0, 1).
+    """
+
+    spaces: Spaces
+    """How observations and actions are numbered."""
+    demonstrations: Sequence[Episode] | None = None
+    """The expert's episodes."""
+    expert: Any = None
+    """Of a table (S,) actions, (S, A) probabilities, NaN where nothing is known, or (S, A) set; else what has `predict`."""
+    environment: World | None = None
+    """A world that can be run and solved."""
+    oracle: Oracle | None = None
+    """Who can be asked what the expert does."""
+    dynamics: TabularMDP | GenerativeModel | None = None
+    """P, gamma and d0 as a table; or an environment that can be set to any state."""
+    reward: TabularReward | None = None
+    """The true reward, paid on the table."""
+    features: FeatureMap | np.ndarray | None = None
+    """phi of observations."""
+    gamma: float | None = None
+    """Discount, where neither dynamics nor environment carries one."""
+    horizon: int | None = None
+    """Steps of an episode, where it is finite."""
+    also: tuple["Problem", ...] = ()
+    """Further problems that share the reward."""
+
+    def __post_init__(self) -> None:
+        if self.gamma is not None:
+            check_discount(self.gamma)
+        told = {name: value.gamma for name in ("dynamics", "environment") if (value := getattr(self, name)) is not None} | (
+            {} if self.gamma is None else {"gamma": self.gamma}
+        )
+        if len({*told.values()}) > 1:
+            said = ", ".join(f"{value} ({name})" for name, value in told.items())
+            raise InvalidParameter(f"the problem has several discounts, {said}: expected one. Make its parts with the same.")
+        if self.horizon is not None:
+            checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+
+    @classmethod
+    def of(cls, dynamics: TabularMDP | Tabulation, **parts: Any) -> "Problem":
+        """A problem on a table.
+
+        Args:
+            dynamics: the table, `tabulate(...)` or its mdp. The true reward of a Tabulation is not taken from it: who knows it
+                gives it as a part.
+            **parts: what else is known, by the names of the fields.
+        """
+        mdp, states = (dynamics.mdp, dynamics.states) if isinstance(dynamics, Tabulation) else (dynamics, None)
+        observations = spaces.Discrete(mdp.n_states) if states is None else states.space
+        return cls(Spaces(observations, spaces.Discrete(mdp.n_actions), states), dynamics=mdp, **parts)
+
+    @property
+    def discount(self) -> float | None:
+        """gamma, whichever part carries it; None where none does."""
+        for part in (self.dynamics, self.environment):
+            if part is not None:
+                return part.gamma
+        return self.gamma
+
+    @cached_property
+    def seen(self) -> EmpiricalPolicy:
+        """What the episodes show of the expert in the table. Ask only where there are episodes and a table.
+
+        Raises:
+            InvalidDemonstrations, UnknownObservation: episodes of another table.
+        """
+        assert isinstance(self.dynamics, TabularMDP) and self.demonstrations is not None
+        states = self.spaces.states or StateIndex(spaces.Discrete(self.dynamics.n_states))
+        return empirical_policy(self.demonstrations, states, self.dynamics.n_actions)
+
+    @property
+    def policy(self) -> Any:
+        """The expert's policy, or where that is not known its most frequent actions, (S, A), NaN in states never visited."""
+        return most_frequent(self.seen) if self.expert is None else self.expert
+
+    @property
+    def visits(self) -> Vector | None:
+        """(S,) how often the episodes visit each state, where they are all that is known of the expert; else None."""
+        return visits(self.seen) if self.expert is None and self.demonstrations is not None else None

@@ -22,4 +22,5 @@ IrlGymError. The names below are imported when first used; `import irl_gym` itse
 
 import lazy_loader
 
+__version__ = "0.1.0"
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -156,14 +156,14 @@ class Problem:
 
     @cached_property
     def seen(self) -> EmpiricalPolicy:
-        """What the episodes show of the expert in the table. Ask only where there are episodes and a table.
+        """How often the episodes take each action in each state. Ask only where there are episodes and states are numbered.
 
         Raises:
-            InvalidDemonstrations, UnknownObservation: episodes of another table.
+            InvalidDemonstrations, UnknownObservation: episodes of other spaces.
         """
-        assert isinstance(self.dynamics, TabularMDP) and self.demonstrations is not None
-        states = self.spaces.states or StateIndex(spaces.Discrete(self.dynamics.n_states))
-        return empirical_policy(self.demonstrations, states, self.dynamics.n_actions)
+        assert self.demonstrations is not None
+        actions: Any = self.spaces.actions
+        return empirical_policy(self.demonstrations, self.spaces.states or StateIndex(self.spaces.observations), int(actions.n))
 
     @property
     def policy(self) -> Any:

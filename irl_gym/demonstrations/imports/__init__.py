@@ -1,5 +1,7 @@
 """Anybody's demonstrations, as episodes.
 
+Open first: `arrays`; `rows` is what all of them become.
+
     from_arrays     arrays and lists: one an episode, one long one, or padded
     from_frame      pandas, CSV, Parquet, with column names as arguments
     from_imitation  trajectories of the package imitation

@@ -1,12 +1,16 @@
 """Sections that lack what they need: in their place stands why, or nothing where nothing is missed."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from reports.page.made_runs import NO_CURVE, stepped_run, table_run
 
+from irl_gym.reports.page import report
 from irl_gym.reports.page.report import sections_of
 from irl_gym.reports.page.sections.absent import LACKS
+from irl_gym.reports.page.sections.section import Section
 
 WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths")}}
 WITHOUT = {
@@ -37,3 +41,12 @@ def test_a_run_without_a_table_has_no_sections_of_states(tmp_path):
     assert names == [
         "summary", "rewards", "learning", "episodes", "certificate", "doctor", "table", "stages", "asked", "reproduce",
     ]  # fmt: skip
+
+
+def test_a_section_that_is_added_to_the_list_is_shown_with_what_it_needs(run, monkeypatch):
+    def weather(config: Mapping[str, Any], actions: tuple[str, ...]) -> Section:
+        return Section("weather", "Weather", f"gamma {config['gamma']}, {len(actions)} actions")
+
+    monkeypatch.setattr(report, "SECTIONS", (*report.SECTIONS, weather))
+    *_, last = sections_of(run)
+    assert (last.name, last.lead) == ("weather", f"gamma {run.config['gamma']}, 4 actions")

@@ -1,0 +1,54 @@
+"""Learners as a user writes them, outside the library: one of rewards, and one of policies."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from irl_gym.demonstrations.demonstrated import smoothed
+from irl_gym.facts import Fact
+from irl_gym.learners.base import Outcome
+from irl_gym.learners.needs import Needs
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.programs.status import Status
+
+
+@dataclass(frozen=True)
+class Told:
+    """A proof of nothing but what was done."""
+
+    sides: int
+    objective: float = 0.0
+    duality_gap: float = float("inf")
+
+    def facts(self):
+        return (Fact("dice", f"thrown with {self.sides} sides"),)
+
+    def to_json(self):
+        return {"sides": self.sides}
+
+
+@dataclass(frozen=True)
+class Dice:
+    """A reward by chance."""
+
+    sides: int = 6
+    needs: ClassVar[Needs] = Needs(("dynamics",))
+
+    def learn(self, problem, rng):
+        known = self.needs.of(problem, self)
+        thrown = rng.integers(self.sides, size=known.dynamics.n_states) / self.sides
+        return Outcome(TabularReward(thrown), Status.OPTIMAL, Told(self.sides))
+
+
+@dataclass(frozen=True)
+class Copycat:
+    """The shares of the actions in the episodes, with one more of each; any action where nothing was seen."""
+
+    needs: ClassVar[Needs] = Needs(("demonstrations",))
+    how: ClassVar[str] = "copied from the episodes"
+
+    def learn(self, problem, rng):
+        known = self.needs.of(problem, self)
+        actions = int(known.spaces.actions.n)
+        return Outcome(None, Status.OPTIMAL, Told(0), policy=np.nan_to_num(smoothed(known.seen), nan=1 / actions))

@@ -1,0 +1,56 @@
+"""A learner of a user's own, of rewards or of policies, from the command line to every report; nothing of irl_gym is edited."""
+
+from pathlib import Path
+
+import pytest
+
+from irl_gym.files.run_folder import read_json
+from irl_gym.loop import loop
+
+FEW = ("--episodes", "10", "--total-timesteps", "2000")
+
+
+@pytest.fixture
+def run(script, monkeypatch, tmp_path):
+    """A run of a learner, without its figures, which take the time."""
+    monkeypatch.setitem(loop.MAKERS, "figures", ())
+    monkeypatch.syspath_prepend(Path(__file__).parents[1])
+
+    def made(name, *more):
+        return script("recover_and_retrain", "--learner", name, *FEW, *more, "--out", "run", cwd=tmp_path)
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "policy", "told", "code"),
+    [
+        ("own_learners:Dice", "retrained", "thrown with 6 sides", 1),
+        ("own_learners:Copycat", "learned", "Not examined: the learner gives a policy", 3),
+    ],
+)
+def test_a_learner_of_ones_own_goes_through_the_loop_and_its_reports(run, script, tmp_path, name, policy, told, code):
+    done = run(name)
+    assert done.returncode == 0 and policy in done.stdout and told in " ".join(done.stdout.split()), done.stderr
+    assert policy in read_json(tmp_path / "run/metrics.json")["policies"]
+    assert script("report", "--run", "run", cwd=tmp_path).returncode == 0
+    assert script("doctor", "--run", "run", cwd=tmp_path).returncode == code
+    assert script("compare", "run", "run", cwd=tmp_path).returncode in (0, 2)
+
+
+def test_options_reach_a_learner_of_ones_own(run):
+    done = run("own_learners:Dice", "--options", "sides=20", "--retrain", "value-iteration")
+    assert done.returncode == 0 and "thrown with 20 sides" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("own_learners:Copycat", "--margin-cap", "0.1"), "--margin-cap is 0.1, but the learner is own_learners:Copycat"),
+        (("trajectory-lp", "--reward-on", "state-action"), "which has no such option: expected finite-lp with it"),
+        (("finite-lp", "--options", "sides=3"), "expected module:Class of your own with it"),
+    ],
+)
+def test_an_option_of_another_learner_is_refused(run, arguments, told):
+    done = run(*arguments)
+    assert done.returncode == 2 and told in " ".join(done.stderr.split())

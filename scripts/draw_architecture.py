@@ -1,7 +1,7 @@
 """Draw which room of irl_gym uses which, from the imports: docs/figures/architecture.svg. Run it in the root of a clone.
 
 A row is a room and what it is, ground last; a dot says that it imports from the room of that column, with how many imports.
-All dots are above the diagonal, since arrows point down only: an import contract of pyproject.toml says so, and it is read here.
+All dots are above the diagonal, since arrows point down only: a contract of pyproject.toml says so, and it is read here.
 
 For example:
     python scripts/draw_architecture.py
@@ -23,8 +23,8 @@ ROW, NAME, TOP, TEXT = 30, 150, 120, 560
 """Height of a row, and where the first column begins, the first row does, and the room for what a room is."""
 STYLE = """
 text { font: 13px system-ui, sans-serif; fill: #1f2328 } .name { font-weight: 600 } .about { fill: #59636e }
-.count { font-size: 11px; text-anchor: middle; fill: #fff } .dot { fill: #0969da } .self { fill: #d1d9e0 } line { stroke: #d1d9e0 }
-rect { fill: #fff }
+.count { font-size: 11px; text-anchor: middle; fill: #fff } .dot { fill: #0969da } .self { fill: #d1d9e0 }
+line { stroke: #d1d9e0 } rect { fill: #fff }
 @media (prefers-color-scheme: dark) { text { fill: #f0f6fc } .about { fill: #9198a1 } .self { fill: #3d444d }
   line { stroke: #3d444d } rect { fill: #0d1117 } .dot { fill: #1f6feb } }
 """

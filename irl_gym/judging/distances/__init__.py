@@ -1,6 +1,7 @@
 """How far apart two rewards are, not counting differences that no policy notices.
 
-Open first: `exact`, distances on a table; `sampled` has those from samples. Two rewards that differ in scale, or by a potential, have the same optimal policies: their raw values say nothing. A distance
+Open first: `exact`, distances on a table; `sampled` has those from samples.
+Two rewards that differ in scale, or by a potential, have the same optimal policies: their raw values say nothing. A distance
 takes a *canonical* form of each, in which such differences are gone, and compares these.
 
     pearson, spearman   correlation of canonical rewards

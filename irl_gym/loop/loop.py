@@ -244,12 +244,12 @@ class Loop:
     @cached_property
     def tabular(self) -> TabularReward | None:
         """The recovered reward in the table."""
-        return self.world.tabular(self.learned)
+        return None if self.learned is None else self.world.tabular(self.learned)
 
     @property
     def weights(self) -> LinearReward | None:
         """The recovered reward of observations, where there is no table."""
-        return self.world.weights(self.learned)
+        return None if self.learned is None else self.world.weights(self.learned)
 
     @cached_property
     def certificate(self) -> Mapping[str, Any]:

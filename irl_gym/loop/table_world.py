@@ -110,11 +110,11 @@ class TableWorld:
         )  # fmt: skip
         return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
 
-    def tabular(self, reward: TabularReward | LinearReward | None) -> TabularReward | None:
-        """A reward of either kind in the table; None where there is none."""
+    def tabular(self, reward: TabularReward | LinearReward) -> TabularReward:
+        """A reward of either kind in the table."""
         return reward.tabular(self.table.states) if isinstance(reward, LinearReward) else reward
 
-    def weights(self, reward: TabularReward | LinearReward | None) -> None:
+    def weights(self, reward: TabularReward | LinearReward) -> None:
         """What a reward of features is known by; here it is one of rows."""
 
     def paid(self, reward: TabularReward | LinearReward, *, shaped: bool, margin_cap: float | None) -> TabularReward:
@@ -135,9 +135,9 @@ class TableWorld:
         """Rows of T + 1 observations, None where the table has none, and (T,) what a reward pays for the steps, NaN there."""
         last = len(actions) if terminated else None
         rows = [self._row(one, terminated=time == last) for time, one in enumerate(observations)]
-        paid, steps = self.tabular(reward), zip(rows, actions, rows[1:], strict=False)
-        if paid is None:
+        if reward is None:
             return rows, np.full(len(actions), np.nan)
+        paid, steps = self.tabular(reward), zip(rows, actions, rows[1:], strict=False)
         return rows, np.array([np.nan if s is None or t is None else float(paid.pay(s, a, t)) for s, a, t in steps])
 
     def _row(self, observation: Any, *, terminated: bool) -> int | None:

@@ -90,7 +90,7 @@ class SteppedWorld:
         finally:
             close(env)
 
-    def tabular(self, reward: TabularReward | LinearReward | None) -> None:
+    def tabular(self, reward: TabularReward | LinearReward) -> None:
         """A reward in the table: there is none."""
 
     def weights(self, reward: TabularReward | LinearReward) -> LinearReward | None:
@@ -110,7 +110,7 @@ class SteppedWorld:
         terminated: bool,
     ) -> tuple[list[int | None], np.ndarray]:
         """No rows of T + 1 observations, and (T,) what a reward of them pays on arrival; NaN of another."""
-        known = self.weights(reward)
+        known = None if reward is None else self.weights(reward)
         paid = [np.nan if known is None else known.of(batch_of_one(one))[0] for one in observations[1:]]
         return [None] * len(observations), np.array(paid, dtype=np.float64)
 

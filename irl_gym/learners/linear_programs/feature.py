@@ -113,7 +113,8 @@ class FeatureLP:
             MissingPart: one of these is not there. And whatever `fit` raises.
         """
         known, learner = self.needs.of(problem, self), featured(self, problem)
-        return learner.fit(known.dynamics, known.policy, states=known.spaces.states)
+        world: Any = known.dynamics  # which is required
+        return learner.fit(world, known.policy, states=known.spaces.states)
 
     def fit(
         self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None

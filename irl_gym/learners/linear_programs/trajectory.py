@@ -17,7 +17,7 @@ Axes: N episodes, K features.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
@@ -102,7 +102,7 @@ class TrajectoryLP:
         Raises:
             MissingPart: one of these is not there. And whatever `fit` raises.
         """
-        known, learner = self.needs.of(problem, self), featured(self, problem)
+        learner, known = featured(self, problem), cast("Any", self.needs.of(problem, self))  # which has what is required
         return learner.fit(known.environment, known.demonstrations)
 
     def fit(self, world: World, episodes: Iterable[Episode], /) -> Outcome[LinearReward, TrajectoryProof]:

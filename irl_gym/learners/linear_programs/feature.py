@@ -85,7 +85,7 @@ class FeatureLP:
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
     needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), ("features",))
-    """What the loop gives `fit`."""
+    """The parts of a problem that `learn` reads."""
 
     def __post_init__(self) -> None:
         if self.features is not None:

@@ -86,7 +86,7 @@ class FiniteLP:
     unvisited: Literal["avoid", "free"] = "avoid"
     """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
     needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"))
-    """What the loop gives `fit`."""
+    """The parts of a problem that `learn` reads."""
     of_feasible_set: ClassVar[bool] = True
     """Is the reward one of those that `irl_gym.judging.ambiguity` describes, by how far they reach and how they depend on
     lambda?"""

@@ -172,14 +172,15 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
     metrics = reader.read("metrics.json", lambda one: read_json(one, Metrics))
     on_table = metrics.get("table") is not None
+    retrained = RETRAINED in metrics["policies"]  # not of a learner of policies: it gives no reward to retrain on
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
-        learned=reader.maybe("reward.npz", load_reward),
+        learned=reader.read("reward.npz", load_reward) if retrained else None,
         expert=reader.read("expert.npz", load_actions) if on_table else None,
-        agent=reader.maybe("agent_policy.npz", load_actions) if on_table else None,
+        agent=reader.read("agent_policy.npz", load_actions) if retrained and on_table else None,
         certificate=reader.read("certificate.json", read_certificate), metrics=metrics,
-        curve=reader.maybe("learning_curve.csv", read_curve) or NO_CURVE, stages=stages,
+        curve=reader.read("learning_curve.csv", read_curve) if retrained else NO_CURVE, stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one, Grid))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")
                if (path / "films" / f"{name}.json").exists()},

@@ -9,6 +9,7 @@ import numpy as np
 import own_learners
 import pytest
 from gymnasium import spaces
+from gymnasium.wrappers import TimeLimit
 
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.agents.simulator import Simulator
@@ -40,7 +41,7 @@ def learner(name):
 def whole():
     """A problem of which everything is known."""
     grid = models.paper_grid()
-    env = TabularEnv(grid.mdp, TabularReward(grid.R), max_episode_steps=20)
+    env = TimeLimit(TabularEnv(grid.mdp, TabularReward(grid.R)), 20)
     table = tabulate(env, gamma=grid.mdp.gamma, check_steps=0)
     states = StateIndex(spaces.Discrete(grid.mdp.n_states))
     episodes = list(

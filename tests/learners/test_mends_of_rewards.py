@@ -30,8 +30,11 @@ from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.problem import Oracle, Problem
+from irl_gym.learners.registry import learner_class
 from irl_gym.mdp.episodes import Episode, collect
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
+from irl_gym.mdp.policies import TabularPolicy
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.deadline import Deadline
 from irl_gym.programs.killable import called, within
@@ -136,6 +139,13 @@ ASIDE = TabularMDP.from_dense(
     np.array([[[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], [[0, 0, 0], [0, 0, 0]]]) * 1.0, 0.9, np.eye(3)[0]
 )
 CASES = [
+    # problems and names
+    ("A table of actions is one as `TabularPolicy(actions, states)`.", lambda: Oracle(MODEL.expert),
+     lambda: Oracle(TabularPolicy(np.eye(3)[MODEL.expert], StateIndex(spaces.Discrete(5))))),
+    ("Make its parts with the same.",
+     lambda: Problem.of(MODEL.mdp, gamma=MODEL.mdp.gamma / 2), lambda: Problem.of(MODEL.mdp, gamma=MODEL.mdp.gamma)),
+    ("Work in its folder, or install it.",
+     lambda: learner_class("nowhere_to_be_found:Dice"), lambda: learner_class("own_learners:Dice")),
     # learners
     ("Give the next observations when they are imported.",
      one_step, lambda: one_step(next_observations=[4, 8])),

@@ -160,6 +160,9 @@ def sampled(S_0):
 
 POLICY = as_distribution(GREEDY, 16, 4)
 CASES = [
+    # features
+    ("Give it features, or `learn` a problem that has some.",
+     lambda _: FeatureLP().fit(MDP, GREEDY), lambda _: FeatureLP(OneHot(16)).fit(MDP, GREEDY)),
     # tabulate
     ("Put it inside.",
      lambda _: table(TransformReward(LearnedReward(lake(), np.arange(16.0)), lambda paid: 2 * paid)),

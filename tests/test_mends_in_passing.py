@@ -268,7 +268,7 @@ STATUSES = [
      FORK, FeatureLP(np.eye(4)[:, 3:]), FeatureLP(np.eye(4))),
     ("Give more or other features.", GRID.mdp, FeatureLP(RANDOM), FeatureLP(np.eye(25))),
 ]  # fmt: skip
-ELSEWHERE = ["Read the certificate's duality gap; if it is too large, choose the other solver."]
+ELSEWHERE = ["Read the proof's duality gap; if it is too large, choose the other solver."]
 """diagnoses/test_solving.py: test_the_other_solver_mends_an_answer_that_was_short"""
 
 

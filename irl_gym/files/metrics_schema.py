@@ -36,6 +36,7 @@ class Proof(TypedDict, total=False):
     """What is known of a reward, whichever learner it is of."""
 
     zero: bool
+    errs: bool
     expressible: bool
     fell_short: bool
     objective: Number | None
@@ -107,6 +108,7 @@ class _Rewarded(Proof):
     unsettled_states: NotRequired[Count]
     violated_states: NotRequired[Count]
     reward_on: NotRequired[Literal["state", "state-action"]]
+    worst_tie_value: NotRequired[Number]
     worst_tie_regret: NotRequired[Number]
     worst_tie_regret_share: NotRequired[Number | None]
     starc: NotRequired[Number | None]
@@ -118,11 +120,12 @@ class Row(TypedDict):
 
     value: Number
     score: Number | None
-    mean_return: Number | None
+    mean_return: Number
     return_low: Number | None
     return_high: Number | None
     agreement: Number | None
     how: Text
+    return_share: NotRequired[Number | None]
     sampled_value: NotRequired[Number]
     sampled_low: NotRequired[Number | None]
     sampled_high: NotRequired[Number | None]

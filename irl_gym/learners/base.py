@@ -71,7 +71,7 @@ class Outcome(Generic[AnyReward, AnyProof]):
     def facts(self) -> tuple[Fact, ...]:
         """What became of the program, and what the proof says."""
         mood = "plain" if self.status is Status.OPTIMAL else "open" if self.status is Status.INACCURATE else "bad"
-        return (Fact("status of the program", self.status.sentence, mood), *self.proof.facts())
+        return (Fact("status of the program", self.status.sentence.removesuffix("."), mood), *self.proof.facts())
 
     def record(self) -> dict[str, Any]:
         """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""

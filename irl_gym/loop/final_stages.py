@@ -102,9 +102,10 @@ def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, ce
     if why is not None:
         return {"no_ambiguity": why}
     told, arrays = {}, {}
-    for name, examine in (("widths", _widths), ("path", _path)):
+    path = partial(_path, margin_cap=certificate["proof"]["margin_cap"])
+    for name, examine in (("widths", _widths), ("path", path)):
         try:
-            found = examine(learner, mdp, known_expert, certificate)
+            found = examine(learner, mdp, known_expert)
             arrays |= {f"{name}.{key}": value for key, value in found.items()}
         except IrlGymError as error:
             told[f"no_{name}"] = f"{type(error).__name__}: {error}"
@@ -115,7 +116,7 @@ def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, ce
 def _too_much(learner: Any, mdp: TabularMDP) -> str | None:
     """Why the feasible set is not examined; None where it is."""
     if not getattr(learner, "of_feasible_set", False):
-        return f"the learner is {type(learner).__name__}: only FiniteLP's reward is examined"
+        return f"{type(learner).__name__} does not say that its reward is one of the feasible set"
     n = int((mdp.reachable & ~mdp.terminal).sum())
     steps = n * mdp.n_actions if learner.reward_on == "state-action" else 0
     if n > MOST_STATES:
@@ -125,19 +126,19 @@ def _too_much(learner: Any, mdp: TabularMDP) -> str | None:
     return None
 
 
-def _widths(learner: Any, mdp: TabularMDP, expert: Any, certificate: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _widths(learner: Any, mdp: TabularMDP, expert: Any) -> dict[str, np.ndarray]:
     """How far apart the rewards of one state can be, or of one step."""
     found = feasible_widths(mdp, expert, r_max=learner.r_max, reward_on=learner.reward_on)
     return {"low": found.low, "high": found.high, "width": found.width}
 
 
-def _path(learner: Any, mdp: TabularMDP, expert: Any, certificate: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _path(learner: Any, mdp: TabularMDP, expert: Any, *, margin_cap: float | None) -> dict[str, np.ndarray]:
     """How the reward changes with lambda, with the cap on margins that the run's own program had."""
     found = lambda_path(
         mdp,
         expert,
         r_max=learner.r_max,
-        margin_cap=certificate["proof"]["margin_cap"],
+        margin_cap=margin_cap,
         reward_on=learner.reward_on,
         most_pieces=MOST_PIECES,
     )

@@ -68,7 +68,8 @@ class Optimality:
     violated: Indices
     """States with a violated row of (4)."""
     violated_rows: np.ndarray
-    """(v, 2) state and action of each violated row: the action is worth more than the expert's under R."""
+    """(v, 2) state and action of each violated row: the action is worth more than the expert's under R; or, where the expert
+    takes it too, something else than its mix."""
     violations: Numbers
     """(v,) by how much each is violated, in units of value."""
     unknown: Indices
@@ -111,8 +112,8 @@ class Optimality:
 
     def _of_states(self) -> Iterator[Fact]:
         if self.violated.size:
-            rows, most = counted(len(self.violated_rows), "action"), f"{self.worst_violation:.3g}"
-            told = f"in {counted(self.violated.size)} another action is better under it: {rows}, by at most {most}"
+            rows, most = counted(len(self.violated_rows), "row"), f"{self.worst_violation:.3g}"
+            told = f"in {counted(self.violated.size)} another action is better under it: {rows} of (4), by at most {most}"
             yield Fact("violated", told, "bad")
         if self.tied.size and not self.zero:
             told = f"in {counted(self.tied.size)} another action is as good as the expert's to rounding, and none better"

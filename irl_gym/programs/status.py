@@ -15,7 +15,7 @@ class Status(enum.Enum):
     INACCURATE = (
         "inaccurate",
         True,
-        "Solved, but short of the solver's tolerances. Read the certificate's duality gap; if it is too large, choose the "
+        "Solved, but short of the solver's tolerances. Read the proof's duality gap; if it is too large, choose the "
         "other solver.",
     )
     ZERO = (

@@ -49,7 +49,8 @@ def render(report: Report) -> Iterator[RenderableType]:
     made = (
         "reward, certificate, agent, metrics, figures" if RETRAINED in metrics["policies"] else "certificate, policy, metrics"
     )
-    yield f"Kept in {out}: dataset, {made} and films."
+    own = "" if report.config.get("dataset") is not None else "dataset, "
+    yield f"Kept in {out}: {own}{made} and films."
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
         yield Text(lost)
@@ -63,7 +64,11 @@ def _doctor(out: Path) -> Iterator[RenderableType]:
     for one in diagnosis["findings"]:
         if one["name"] in ABOUT_THE_GIVEN:
             yield Text(f"Warning: {one['sentence']} {one['mend']}", "yellow")
-    more = f" python scripts/doctor.py --run {shlex.quote(str(out))}" if diagnosis["findings"] else ""
+    more = (
+        f" This command tells them, with mends: python scripts/doctor.py --run {shlex.quote(str(out))}"
+        if diagnosis["findings"]
+        else ""
+    )
     yield Text(f"The doctor: {told_answer(diagnosis)}{more}", ANSWERS[diagnosis["answer"]])
 
 

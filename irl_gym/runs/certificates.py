@@ -18,7 +18,7 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.sampling_error import ESTIMATED
 from irl_gym.tables.tabulation import Tabulation
 
-FREQUENT = Fact("judged", "the actions most frequent in its episodes")
+FREQUENT = Fact("taken for the expert's", "the actions most frequent in its episodes")
 ESTIMATE = Fact("judged on", ESTIMATED, "open")
 
 

@@ -182,7 +182,7 @@ SAID = {
     "noisy": (
         "expert with its errors = 1",
         "an optimal action",
-        "judged │ the actions most frequent in its episodes",
+        "taken for the expert's │ the actions most frequent in its episodes",
         "none: it gains",
     ),
 }

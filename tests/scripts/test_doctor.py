@@ -133,7 +133,9 @@ def test_an_expert_with_noise_is_judged_by_what_its_episodes_show(runs):
 def test_an_unfinished_run_with_its_reward_is_diagnosed_as_a_finished_one(runs):
     unfinished, finished = diagnose_unfinished(runs / "paper"), diagnose_run(read_run(runs / "paper"))
     assert unfinished.to_json()["findings"] == finished.to_json()["findings"]
-    assert unfinished.examined == f"{finished.examined} Not examined, of {len(CHECKS)} questions: 5, as no run judged it."
+    assert (
+        unfinished.examined == f"{finished.examined} Not examined, of {len(CHECKS)} questions: 5, as no finished run judged it."
+    )
 
 
 def test_a_folder_that_holds_too_little_has_no_diagnosis(tmp_path):

@@ -205,7 +205,7 @@ class Case:
         if self.reward is not None:
             found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
             # What follows an unknown state is worth what acting best is, as in `optimality`.
-            taken = self.fully_known and not self.claims.get("errs")  # at its word
+            taken = self.fully_known and not self.claims.get("errs", self.claims.get("slack") is not None)  # at its word
             margins = margins_of(found, c) if taken else best_margins(found, c)
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
@@ -231,9 +231,8 @@ class Case:
     @cached_property
     def unsettled(self) -> Indices:
         """(k,) rows with a margin that is within its sampling error; none on an exact table."""
-        if self.rows is None:
+        if (rows := self.rows) is None:
             return np.zeros(0, dtype=np.int64)
-        rows = self.rows
         return np.flatnonzero(rows.usable & (rows.margins > rows.none) & (rows.margins <= rows.errors))
 
     @property

@@ -12,8 +12,8 @@ Evidence = Literal["certificate", "metrics", "expert", "reward", "true", "progra
 def lacking(case: Case, needs: Sequence[Evidence]) -> str | None:
     """Why the first of some evidence that a case has not is not there, in words; None where all is."""
     told = {
-        "certificate": None if case.claims else "there is no learner's certificate",
-        "metrics": None if case.judged else "no run judged it",
+        "certificate": None if case.claims else "there is no learner's proof",
+        "metrics": None if case.judged else "no finished run judged it",
         **dict.fromkeys(("expert", "reward", "true", "programs"), "there is no table"),
     }
     if case.mdp is not None:

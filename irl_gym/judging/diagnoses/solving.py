@@ -38,9 +38,7 @@ def inaccurate(case: Case) -> Finding | None:
 
 def far_from_optimal(case: Case) -> Finding | None:
     """Weak duality, recomputed: no reward has a larger objective than the bound, and none with these margins is smaller."""
-    if (
-        case.status is not None and not case.status.usable
-    ):  # an objective of 0 is no unit; a zero reward has a finding of its own
+    if case.status is not None and not case.status.usable:  # 0 is no unit; a zero reward has a finding of its own
         return None
     gap, objective = case.claims.get("duality_gap"), case.claims.get("objective")
     if gap is not None and objective is not None and gap > _far(case, objective):
@@ -74,6 +72,6 @@ def retried(case: Case) -> Finding | None:
     return Finding(
         "solver-retried",
         f"{first} gave no answer to the program {name!r}, and {one['solver']} did, after {one['seconds']:.1f} s in all. The "
-        "answer is as good as its certificate.",
+        "answer is as good as its proof.",
         f'solver="{one["solver"]}" asks it first.',
     )

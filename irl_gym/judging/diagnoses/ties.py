@@ -74,7 +74,7 @@ def same_successors(case: Case) -> Finding | None:
     return _found("same-successors", told, (mend or 'reward_on="state-action".', on_steps(case)), rows, which)
 
 
-def _marginless(case: Case, rows: Rows) -> np.ndarray:
+def _marginless(rows: Rows) -> np.ndarray:
     """(k,) rows that a reward of this kind can move and that have no margin, without being violated."""
     return np.flatnonzero(rows.usable & rows.tied)
 
@@ -123,7 +123,7 @@ def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:
     rows, none = case.rows, np.zeros(0, dtype=np.int64)
     if rows is None or not (case.speaks and case.judges_states):
         return None, none, none, False
-    which = _marginless(case, rows)
+    which = _marginless(rows)
     if not which.size:
         return rows, none, none, False
     possible = case.can_have_margin

@@ -20,7 +20,7 @@ of them, so that the expert is optimal in S_0, and strictly but for the rows lef
 makes the expert optimal, a tenth of the mean margin under the paper's reward.
 
 Departs: an action that the expert takes too, when it takes several, has to be as good; its rows d and -d both go into the sum,
-where they cost (penalty - 1) |d|. The certificate judges all reachable states of a table, not the sample only.
+where they cost (penalty - 1) |d|. `certify` judges all reachable states of a table, not the sample only.
 Axes: S states, A actions, K features.
 """
 

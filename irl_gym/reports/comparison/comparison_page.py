@@ -13,7 +13,7 @@ from typing import Any
 from irl_gym.errors import InvalidParameter
 from irl_gym.judging import measures
 from irl_gym.judging.diagnoses.findings import told_answer
-from irl_gym.judging.measures import explained, shown
+from irl_gym.judging.measures import Measure, explained, shown
 from irl_gym.judging.scores import REFERENCES, agent_of, called, others
 from irl_gym.judging.shares import judged
 from irl_gym.reports.comparison.pooled import over_seeds
@@ -87,10 +87,11 @@ def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
 def _results(named: Mapping[str, Run]) -> Section:
     """One row a number, one column a run."""
     places = run_places(named)
+    told = shown(measures.POLICIES, [row for run in named.values() for row in run.metrics["policies"].values()])
     columns = [
         {
             "environment": places[letter],
-            **dict(_numbers(run.metrics, recomputed=run.recomputed)),
+            **dict(_numbers(run.metrics, told, recomputed=run.recomputed)),
             "time of all stages": _time(run),
         }
         for letter, run in named.items()
@@ -123,10 +124,16 @@ def _time(run: Run) -> str:
     return seconds(sum(record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"))
 
 
-def _numbers(metrics: Mapping[str, Any], *, recomputed: bool) -> Iterator[tuple[str, str]]:
-    """What the table of results says of a run's policies and reward."""
+def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed: bool) -> Iterator[tuple[str, str]]:
+    """What the table of results says of a run's policies and reward.
+
+    Args:
+        metrics: the run's.
+        told: measures of policies that some run has.
+        recomputed: was what it says of the expert under the reward computed from the run's files?
+    """
     policies, reward = metrics["policies"], metrics["reward"]
-    told, agents = shown(measures.POLICIES, list(policies.values())), others(policies)
+    agents = others(policies)
     for one, name in product((one for one in told if one.relative), agents):
         yield f"{one.heading}, {called(name)}", one.text(policies[name])
     for name in agents:
@@ -138,7 +145,7 @@ def _numbers(metrics: Mapping[str, Any], *, recomputed: bool) -> Iterator[tuple[
     yield from ((one.heading, one.text(reward)) for one in shown(measures.REWARDS, [reward]))
     whose = "" if recomputed else ", as recorded"
     if "expert_optimal" in reward:
-        yield "expert optimal under the reward", f"{answer(reward['expert_optimal'])}{whose}"
+        yield "expert optimal under the reward", f"{answer(reward.get('expert_optimal'))}{whose}"
     if policies[agent_of(policies)]["score"] is not None:
         steps = metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
@@ -218,7 +225,11 @@ def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 def _proofs(named: Mapping[str, Run]) -> Section:
     """What each run's reward says of its expert, and what its learner proves."""
-    columns = [{one.label: one.sentence for part in facts_in(run.certificate) for one in part} for run in named.values()]
+    columns = [
+        {one.label: one.sentence for one in of_reward}
+        | {f"{one.label}, as its learner recorded": one.sentence for one in of_program}
+        for of_reward, of_program in (facts_in(run.certificate) for run in named.values())
+    ]
     labels = dict.fromkeys(label for column in columns for label in column)
     rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
     recorded = ", ".join(letter for letter, run in named.items() if not run.recomputed)

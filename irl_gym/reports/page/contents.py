@@ -74,11 +74,6 @@ class Contents:
         return self.run.metrics["policies"]
 
     @property
-    def reward(self) -> Mapping[str, Any]:
-        """What was measured of the recovered reward."""
-        return self.run.metrics["reward"]
-
-    @property
     def training(self) -> Mapping[str, Any]:
         """What was measured of the agent's training."""
         return self.run.metrics["training"]

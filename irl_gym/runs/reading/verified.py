@@ -19,7 +19,7 @@ from irl_gym.errors import InvalidDiscount, InvalidReward, IrlGymError
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.evaluation import Candidate, good_actions, judge, scale_of
 from irl_gym.judging.metrics import policy_value
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED
+from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.judging.shares import returns_of
 from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.rewards import TabularReward
@@ -100,8 +100,10 @@ def claims(
     known = known_by(config)
     learner = {"learner": config["learner"]["type"]} if (config.get("learner") or {}).get("type") else {}
     yield Claim("config.json", {"reward": learner, "demonstrations": known})
+    shown = ".stages/demonstrations.json" if known["given"] else ".stages/expert.json"
+    made = {EXPERT: shown, RANDOM: "config.json", LEARNED: ".stages/reward.json", RETRAINED: ".stages/agent.json"}
     for name, how in came_about(config, stages).items():
-        file = {EXPERT: ".stages/expert.json", RANDOM: "config.json"}.get(name, ".stages/agent.json")
+        file = made[name]
         yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})

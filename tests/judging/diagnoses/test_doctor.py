@@ -63,7 +63,7 @@ def test_a_healthy_diagnosis_says_what_was_examined():
 def test_questions_that_cannot_be_asked_are_counted_with_why():
     said = doctor(FiniteLP().fit(GRID.mdp, GRID.expert), GRID.mdp, GRID.expert).examined
     assert said.endswith(
-        f" Not examined, of {len(CHECKS)} questions: 5, as no run judged it; 2, as the true reward is not known."
+        f" Not examined, of {len(CHECKS)} questions: 5, as no finished run judged it; 2, as the true reward is not known."
     )
 
 

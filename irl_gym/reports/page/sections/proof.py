@@ -13,9 +13,6 @@ from irl_gym.runs.certificates import facts_in
 from irl_gym.tables.tabulation import Tabulation
 from irl_gym.written import counted, number
 
-ROUNDING = 1e-7
-"""A gap to the program's optimum below this share of the objective is none."""
-
 
 def proved(certificate: Mapping[str, Any], recomputed: bool, table: Tabulation | None) -> Section:
     """What the learned reward says of the expert, what its learner proves, and the raw numbers behind both."""
@@ -29,9 +26,16 @@ def proved(certificate: Mapping[str, Any], recomputed: bool, table: Tabulation |
     if table is not None and not of_reward:
         lead = "What the learner proves of the policy that it gives."
     elif table is None:
-        lead = "What the learner proves, from the sampled trajectories and the reward alone. Without a table there is no more."
+        lead = "What the learner proves. Without a table nothing is computed beside it."
     shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}
-    return Section("certificate", "Certificate", f"{lead} No solver's word is taken.", (), "certificate", shown)
+    return Section(
+        "certificate",
+        "Certificate",
+        f"{lead} No solver's word is taken but for the status of the program.",
+        (),
+        "certificate",
+        shown,
+    )
 
 
 def whence(recomputed: bool) -> str:
@@ -67,7 +71,7 @@ def table_facts(told_of_table: Mapping[str, Any], actions: tuple[str, ...]) -> S
     """How big the table is, and how far it is to be trusted."""
     told = told_of_table
     lines = [
-        ("States", f"{told['states']:,}, of which episodes visit {told['reachable']:,}"),
+        ("States", f"{told['states']:,}, of which episodes can visit {told['reachable']:,}"),
         ("Actions", f"{told['actions']:,}: {', '.join(actions[:12])}"),
         ("Transitions", f"{told['transitions']:,}"),
     ]

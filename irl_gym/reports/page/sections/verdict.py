@@ -9,8 +9,9 @@ from irl_gym.judging.confirmation import loss_told
 from irl_gym.judging.measures import explained, no_score, shown
 from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, called, others, score_of
 from irl_gym.judging.shares import MUCH, judged, judgements, returns_of
+from irl_gym.learners.linear_programs.proofs.proven import ROUNDING
 from irl_gym.mdp.sampling_error import estimated_table
-from irl_gym.reports.page.sections.proof import ROUNDING, whence
+from irl_gym.reports.page.sections.proof import whence
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.written import counted, number, percent, sentence_of, sum_of
 
@@ -142,9 +143,10 @@ def _sentence(
         if share > 1e-9
         else "; every policy that is best under that reward is as good as the expert"
     )
-    certified = "; whether the expert is optimal under it is undecided"
+    who = "what the expert is seen to do most" if metrics["reward"].get("errs") else "the expert"
+    certified = f"; whether {who} is optimal under it is undecided"
     if optimal is not None:
-        certified = f"; the expert is {'' if optimal else 'not '}optimal under it"
+        certified = f"; {who} is {'' if optimal else 'not '}optimal under it"
     certified += "" if recomputed else ", by the run's own record"
     if not _judged(metrics["reward"]):
         certified = ""

@@ -128,7 +128,7 @@ def lambda_slider(scene: Scene, lambda_path: Mapping[str, Any], certificate: Map
             else f" The path is not certified: the optimum can be {more} above it, and pieces may lack."
         )
     if certificate["proof"].get("slack") is not None:
-        thinned += " This path is of a program whose rows are hard, not of the run's own, which prices violations: its lambda_0 is another."
+        thinned += " Its rows are hard, where the run's own program prices violations: so its lambda_0 is another."
     lead = (
         "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "
         f"lambda_0 = {number(pieces.low[-1])} on it is 0. Move the slider to walk through the pieces.{thinned}"

@@ -175,7 +175,7 @@ def test_a_stage_without_text_shows_pictures():
         ("Pendulum-v1", {}, NotDiscrete, "expected Discrete"),
         ("Taxii-v4", {}, UnknownEnvironment, "The closest are"),
         ("FrozenLake-v1", {"render_mode": "human"}, InvalidParameter, "expected none. Choose with the mode"),
-        ("test_playing:Corridor-v0", {}, UnknownEnvironment, "expected an id"),
+        ("enumeration_envs:Corridor-v0", {}, UnknownEnvironment, "expected an id"),
     ],
 )
 def test_a_stage_refuses_what_cannot_be_played(env_id, kwargs, error, says):

@@ -257,7 +257,11 @@ def test_the_doctor_finds_that_two_episodes_are_few(two, from_data):
 
 def test_the_report_counts_what_the_doctor_found(two):
     count = len(read_json(two.out / "diagnosis.json")["findings"])
-    assert count > 1 and f"The doctor: {count} findings. python scripts/doctor.py --run {two.out}" in printed(two)
+    assert (
+        count > 1
+        and f"The doctor: {count} findings. This command tells them, with mends: python scripts/doctor.py --run {two.out}"
+        in printed(two)
+    )
 
 
 def test_one_episode_is_all_there_is_where_nothing_is_left_to_chance(tmp_path):

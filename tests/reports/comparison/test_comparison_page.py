@@ -113,6 +113,15 @@ def test_the_doctor_says_of_a_run_what_its_own_page_says(runs, tmp_path):
     assert own["sentence"].endswith("(row 0, column 1; left).") and "--episodes" in own["mend"]
 
 
+def test_what_a_learner_recorded_is_never_told_in_place_of_what_is_computed(runs, tmp_path):
+    forged = {"label": "expert optimal under it", "sentence": "FORGED", "mood": "good"}
+    held = runs["lake"].certificate
+    proof = {**held["proof"], "facts": [*held["proof"]["facts"], forged]}
+    write_comparison([replace(runs["lake"], certificate={**held, "proof": proof}), runs["priced"]], tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text()
+    assert "expert optimal under it, as its learner recorded" in text and "yes: the best policy earns at most" in text
+
+
 def test_a_run_in_the_folder_that_one_is_in_has_that_folders_name(runs, tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")

@@ -123,7 +123,7 @@ def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     said = " ".join(made.stdout.replace("│", " ").split())
-    told = ("expert with its errors = 1", "expert not seen", "nothing is asked of it", "712 reachable states")
+    told = ("expert with its errors = 1", "expert not seen", "nothing is asked of it", "of 712 states")
     assert [words for words in told if words not in said] == []
     (metrics,) = tmp_path.glob("runs/*/metrics.json")
     found = json.loads(metrics.read_text())

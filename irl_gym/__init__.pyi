@@ -15,6 +15,8 @@ from .learners.base import Outcome as Outcome
 from .learners.linear_programs.feature import FeatureLP as FeatureLP
 from .learners.linear_programs.finite import FiniteLP as FiniteLP
 from .learners.linear_programs.trajectory import TrajectoryLP as TrajectoryLP
+from .learners.needs import Needs as Needs
+from .learners.problem import Problem as Problem
 from .loop.pipeline import recover_and_retrain as recover_and_retrain
 from .mdp.episodes import collect as collect
 from .mdp.episodes import empirical_policy as empirical_policy

@@ -39,4 +39,4 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
 
 if __name__ == "__main__":
     asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
-    sys.exit(exit_code(lambda: main(asked, [*PROGRAM, *sys.argv[1:]]), others="the environment"))
+    sys.exit(exit_code(lambda: main(asked, [*PROGRAM, *sys.argv[1:]]), others="the environment or of a learner of your own"))

@@ -38,7 +38,7 @@ class Dice:
     def learn(self, problem, rng):
         known = self.needs.of(problem, self)
         thrown = rng.integers(self.sides, size=known.dynamics.n_states) / self.sides
-        return Outcome(TabularReward(thrown), Status.OPTIMAL, Told(self.sides))
+        return Outcome(TabularReward(thrown), Status.LEARNED, Told(self.sides))
 
 
 @dataclass(frozen=True)
@@ -51,4 +51,4 @@ class Copycat:
     def learn(self, problem, rng):
         known = self.needs.of(problem, self)
         actions = int(known.spaces.actions.n)
-        return Outcome(None, Status.OPTIMAL, Told(0), policy=np.nan_to_num(smoothed(known.seen), nan=1 / actions))
+        return Outcome(None, Status.LEARNED, Told(0), policy=np.nan_to_num(smoothed(known.seen), nan=1 / actions))

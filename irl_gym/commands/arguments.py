@@ -161,11 +161,9 @@ class Arguments:
         if self.learning.learner == "finite-lp":
             learner: Any = self.learning.finite(from_episodes=shown.dataset is not None or shown.epsilon > 0)
         else:
-            own = (
-                None
-                if self.learning.learner in TAKEN
-                else learner_of(self.learning.learner, parse_keywords(self.learning.options))
-            )
+            named = self.learning.learner
+            own = None if named in TAKEN else learner_of(named, parse_keywords(self.learning.options, "options"))
+            self.learning.check(None if own is None else own.needs)
             env = environment_of(
                 env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal,
                 trust_dataset=shown.trust_dataset,

@@ -11,6 +11,7 @@ from irl_gym.features.feature_maps import FeatureMap
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.learners.needs import Needs
 from irl_gym.runs.named_parts import FeatureName, PlannerName, features_named
 
 
@@ -47,13 +48,16 @@ class Learning:
     time_limit: Annotated[float | None, UNSET] = None
     """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
 
-    def check(self) -> None:
+    def check(self, needs: Needs | None = None) -> None:
         """Check that no option is given which the learner does not have.
+
+        Args:
+            needs: of a learner of the user's own; None where that is not known yet.
 
         Raises:
             InvalidParameter: one that only others have.
         """
-        taken = TAKEN.get(self.learner, TAKEN_BY_OWN)
+        taken = TAKEN.get(self.learner) or taken_by_own(needs)
         for one in fields(self):
             if one.name not in ("learner", *taken) and getattr(self, one.name) != one.default:
                 flag, whose = one.name.replace("_", "-"), [name for name, names in TAKEN.items() if one.name in names]
@@ -98,5 +102,11 @@ TAKEN = {
     "trajectory-lp": ("l1", "features", "size", "coordinates", "rounds", "gap_cap", "inner", "time_limit"),
 }
 """The options that each learner has; another is refused, not ignored."""
-TAKEN_BY_OWN = ("options", "features", "size", "coordinates", "inner")
-"""Those of a learner of the user's own; its features are the problem's."""
+OF_PART = {"features": ("features", "size", "coordinates"), "environment": ("inner",)}
+"""The options that make a part of the problem."""
+
+
+def taken_by_own(needs: Needs | None) -> tuple[str, ...]:
+    """The options of a learner of the user's own: its own, and those of parts that it needs."""
+    parts = OF_PART if needs is None else [part for part in OF_PART if part in needs.parts]
+    return ("options", *(option for part in parts for option in OF_PART[part]))

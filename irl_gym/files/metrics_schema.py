@@ -137,6 +137,8 @@ def _with_references(rows: Any) -> Any:
     lacking = [name for name in ("expert", "random") if name not in rows]
     if lacking:
         raise ValueError(f"a policy {lacking[0]}")
+    if len(rows) < 3:
+        raise ValueError("a policy that is judged, beside expert and random")
     return rows
 
 

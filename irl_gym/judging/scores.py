@@ -110,7 +110,7 @@ def agent_of(policies: Iterable[str]) -> str:
 
 def called(name: str) -> str:
     """What a judged policy is called in a table."""
-    return "retrained agent" if name == RETRAINED else name
+    return {RETRAINED: "retrained agent", LEARNED: "learner's policy"}.get(name, name)
 
 
 def score_of(score: float | None) -> str:

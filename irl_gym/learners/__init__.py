@@ -1,4 +1,5 @@
-"""Learners: frozen records of hyper-parameters that turn an MDP and an expert into a reward with a certificate.
+"""Learners: frozen records that turn a `Problem` into an `Outcome`: a reward, a policy or both.
 
-Open first: `base`, what every learner is and gives. A family is one folder: `linear_programs/`.
+Open first: `base`, what every learner is and gives. `needs` and `problem` are Table 1 of the lecture notes, `registry` finds
+learners by name. A family is one folder: `linear_programs/`.
 """

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 import numpy as np
 
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidParameter
-from irl_gym.facts import Fact
+from irl_gym.errors import InvalidParameter, InvalidReward
+from irl_gym.facts import Fact, Mood
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
@@ -19,17 +19,7 @@ from irl_gym.programs.solvers import Status, check_solving
 
 @runtime_checkable
 class Proof(Protocol):
-    """What every learner proves of its program; each learner's says more."""
-
-    @property
-    def objective(self) -> float:
-        """The program's objective at the reward, recomputed."""
-        ...
-
-    @property
-    def duality_gap(self) -> float:
-        """How far the reward can be from the program's optimum."""
-        ...
+    """What every learner says of its program, or of what it did; each says more."""
 
     def facts(self) -> tuple[Fact, ...]:
         """What it says, in sentences."""
@@ -50,28 +40,38 @@ class Outcome(Generic[AnyReward, AnyProof]):
     """What was learned, a reward or a policy or both, and what the learner proves of it.
 
     Raises:
-        InvalidParameter: neither a reward nor a policy.
+        InvalidParameter: neither a reward nor a policy; or a status or a proof that is none.
+        InvalidReward: a reward that is none.
     """
 
     reward: AnyReward
     """(S,) paid on arrival, (S, A), or alpha . phi paid on arrival; None of a learner of policies."""
     status: Status
-    """What became of the program; `status.sentence` says it."""
+    """What became of the program, or that there was none; `status.sentence` says it."""
     proof: AnyProof
     """What the learner proves of its program, such as a FiniteProof; what the reward says of the expert, `certify` tells."""
     stats: Mapping[str, Any] = field(default_factory=dict)
     """Solver, seconds, iterations, program by program."""
     policy: Any = None
-    """Of a table (S,) actions or (S, A) probabilities; else what has `predict`. None of a learner of rewards alone."""
+    """Of a table (S,) actions, (S, A) probabilities, or what has `predict`, whose deterministic actions a run keeps; without a
+    table an agent of SB3 (`irl_gym.agents.planners.Agent`). None of a learner of rewards alone."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.reward, TabularReward | LinearReward | None):
+            raise InvalidReward(f"the reward is a {type(self.reward).__name__}: expected a TabularReward or a LinearReward.")
+        if not isinstance(self.status, Status):
+            raise InvalidParameter(f"status is {self.status!r:.80}: expected a Status, such as Status.LEARNED.")
+        if not isinstance(self.proof, Proof):
+            raise InvalidParameter(f"proof is a {type(self.proof).__name__}: expected `facts()` and `to_json()`.")
         if self.reward is None and self.policy is None:
             raise InvalidParameter("reward and policy are None: expected what was learned, at least one of the two.")
 
     def facts(self) -> tuple[Fact, ...]:
         """What became of the program, and what the proof says."""
-        mood = "plain" if self.status is Status.OPTIMAL else "open" if self.status is Status.INACCURATE else "bad"
-        return (Fact("status of the program", self.status.sentence.removesuffix("."), mood), *self.proof.facts())
+        moods: dict[Status, Mood] = {Status.OPTIMAL: "plain", Status.LEARNED: "plain", Status.INACCURATE: "open"}
+        label = "status" if self.status is Status.LEARNED else "status of the program"
+        told = Fact(label, self.status.sentence.removesuffix("."), moods.get(self.status, "bad"))
+        return (told, *self.proof.facts())
 
     def record(self) -> dict[str, Any]:
         """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""
@@ -83,7 +83,7 @@ class Learner(Protocol):
     """Learns from what is known of an expert and a world: a frozen record of hyper-parameters.
 
     It may say in `how` how its policy comes about, and in `of_feasible_set` that its reward is one of all those under which the
-    expert is optimal, so that these are examined.
+    expert is optimal, so that these are examined: then it has `r_max` and `reward_on`, as FiniteLP has.
     """
 
     needs: ClassVar[Needs]

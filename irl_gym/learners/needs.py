@@ -5,7 +5,8 @@
     environment, dynamics T      no         yes        yes              environment, dynamics
     oracle pi*                   no         no         yes              oracle
     reward R                     no         optional   optional         reward
-Who needs an oracle is interactive, who needs an environment or its dynamics active, who needs neither passive.
+Who needs an oracle is interactive, who needs an environment or its dynamics active, who needs neither passive. A reward that is
+required moves nobody: Table 1 has no column for who reads it and needs no environment.
 """
 
 from collections.abc import Callable, Mapping
@@ -100,14 +101,16 @@ class Needs:
             MissingPart: it lacks a part that is required.
         """
         given = {one for one in PARTS if not _absent(getattr(problem, one))} | ({"gamma"} if problem.discount else set())
+        later: set[str] = set()
         for part in self.required:
+            later |= {*[one for one in part.split(OR) if one in given][1:]}
             if given.isdisjoint(part.split(OR)):
                 how = "; or ".join(TO_GET[one] for one in part.split(OR))
                 raise MissingPart(
                     f"{type(learner).__name__} needs {part}, and the problem has {_listed(given)}: expected {how}."
                 )
         kept = {} if "gamma" in self.unused else {"gamma": problem.discount}
-        return replace(problem, **{one: () if one == "also" else None for one in self.unused}, **kept)
+        return replace(problem, **{one: () if one == "also" else None for one in (*self.unused, *later)}, **kept)
 
 
 def _absent(part: Any) -> bool:

@@ -24,7 +24,7 @@ from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.demonstrated import most_frequent, visits
 from irl_gym.environments.generative import GenerativeModel
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidMDP, InvalidParameter, MissingPart
 from irl_gym.features.feature_maps import FeatureMap
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
@@ -94,7 +94,7 @@ class Problem:
     """What is known of an expert and a world.
 
     Raises:
-        InvalidParameter: parts of another table, or discounts that differ.
+        InvalidMDP, InvalidParameter: dynamics or environment that are none, or discounts that differ.
         InvalidDiscount: gamma outside (0, 1).
     """
 
@@ -122,6 +122,12 @@ class Problem:
     """Further problems that share the reward."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.dynamics, TabularMDP | GenerativeModel | None):
+            what = "a TabularMDP or a GenerativeModel, or None; of a Tabulation its `mdp`"
+            raise InvalidMDP(f"dynamics is a {type(self.dynamics).__name__}: expected {what}.")
+        if not isinstance(self.environment, World | None):
+            what = "a world that can be run and solved, such as Simulator(env, SB3(), gamma)"
+            raise InvalidParameter(f"environment is a {type(self.environment).__name__}: expected {what}.")
         if self.gamma is not None:
             check_discount(self.gamma)
         told = {name: value.gamma for name in ("dynamics", "environment") if (value := getattr(self, name)) is not None} | (
@@ -168,7 +174,11 @@ class Problem:
     @property
     def policy(self) -> Any:
         """The expert's policy, or where that is not known its most frequent actions, (S, A), NaN in states never visited."""
-        return most_frequent(self.seen) if self.expert is None else self.expert
+        if self.expert is not None:
+            return self.expert
+        if self.demonstrations is None:
+            raise MissingPart("the problem has neither expert nor demonstrations: expected one of them.")
+        return most_frequent(self.seen)
 
     @property
     def visits(self) -> Vector | None:

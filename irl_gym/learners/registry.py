@@ -6,6 +6,7 @@ import inspect
 from typing import Any
 
 from irl_gym.errors import InvalidParameter, UnknownLearner
+from irl_gym.learners.needs import Needs
 
 BUILT_IN = {
     "finite-lp": "irl_gym.learners.linear_programs.finite:FiniteLP",
@@ -30,19 +31,21 @@ def learner_class(name: str) -> type[Any]:
         close = difflib.get_close_matches(name, BUILT_IN, 1)
         offer = f" Did you mean {close[0]!r}?" if close else ""
         raise UnknownLearner(f"learner is {name!r}: expected one of {', '.join(BUILT_IN)}, or module:Class of your own.{offer}")
+    if not all(part.isidentifier() for part in module.split(".")):
+        raise UnknownLearner(f"learner is {name!r}: expected a module and a class, such as my_module:MyLearner.")
     try:
         found = getattr(importlib.import_module(module), attribute)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # of something that the user's module imports
         raise UnknownLearner(
-            f"learner is {name!r}, and there is no module {error.name!r}: expected one that Python finds. Work in its folder, "
-            "or install it."
+            f"learner is {name!r}, and there is no module {error.name!r}: expected one that Python finds. Put its folder on "
+            "PYTHONPATH, or install it."
         ) from error
     except AttributeError as error:
         raise UnknownLearner(f"learner is {name!r}, and {module} has no {attribute!r}: expected a class of it.") from error
-    lacking = [part for part in ("needs", "learn") if not hasattr(found, part)]
-    if not inspect.isclass(found) or lacking:
+    usable = isinstance(getattr(found, "needs", None), Needs) and callable(getattr(found, "learn", None))
+    if not inspect.isclass(found) or not usable:
         raise UnknownLearner(
             f"learner is {name!r}, {found!r:.80}: expected a class with `needs` and `learn`, as in irl_gym.learners.base."
         )

@@ -4,7 +4,7 @@
                     enumeration that was killed is continued, and a table that was made is kept
     expert          a planner on the true reward; or what a dataset says of the expert's policy
     demonstrations  episodes of the expert, a Minari dataset; or the dataset that was given
-    reward          a learner: from P and the expert's policy (Ng & Russell, sections 3 and 4), or from episodes (section 5)
+    reward          a learner's outcome, of what it needs of all that is known: a reward, a policy or both
     agent           a planner that sees only the learned reward, on a table shaped by its expected advantage
     metrics         values under the true reward, exact on tables, and returns of episodes in the environment itself
     figures         rewards, values, policies, learning curve
@@ -116,7 +116,8 @@ class Loop:
         self.report_progress = on_progress or (lambda stage, share: None)
         self.report_progress("table", 0.0)
         start = time.perf_counter()
-        check_savable(getattr(experiment.learner, "features", None))
+        for features in (getattr(experiment.learner, "features", None), experiment.features):
+            check_savable(features)
         self.env = environment_of(
             experiment.env_id, experiment.env_kwargs, experiment.dataset, experiment.dataset_root,
             start_seeds=experiment.start_seeds, reveal=experiment.reveal, trust_dataset=experiment.trust_dataset,
@@ -209,7 +210,7 @@ class Loop:
             "demonstrations": lambda: self.demonstrations,
             "expert": lambda: None if asked.from_episodes else self.expert,
             "environment": lambda: self.simulator,
-            "oracle": lambda: None if self.given is not None else Oracle(world.actor(self.expert, asked.seed)),
+            "oracle": lambda: None if asked.from_episodes else Oracle(world.actor(self.expert, asked.seed)),
             "dynamics": lambda: world.mdp,
             "reward": lambda: world.true,
             "features": lambda: asked.features,

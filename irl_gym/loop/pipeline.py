@@ -29,7 +29,7 @@ def recover_and_retrain(
     Leaves under `out`:
         config.json, run.json, environment.json       what was asked, who wrote it, where it took place
         table.npz, expert.npz, dataset/ (Minari)      expert.zip where there is no table; a dataset given is not copied
-        reward.npz, certificate.json                  what was learned
+        reward.npz, certificate.json                  what was learned; learned_policy.npz of a learner that gives a policy
         agent.zip, agent_policy.npz                   who was retrained; agent.shown.npz where it was shown rows of states
         learning_curve.csv, tensorboard/              how
         metrics.json, metrics.csv, figures/           how good it is

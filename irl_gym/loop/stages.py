@@ -18,12 +18,13 @@ from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import AfterEnd, left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
+from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.run_folder import LOGS, write_json
 from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
 from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
-from irl_gym.learners.base import Learner
+from irl_gym.learners.base import Learner, Outcome
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.worlds import World
@@ -31,6 +32,7 @@ from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import certificate_of
+from irl_gym.runs.experiment import class_name
 from irl_gym.runs.logs import log_scalars, logged
 from irl_gym.runs.scorecard import came_about, how_of, outcome_of, scorecard
 from irl_gym.tables.tabulation import Tabulation
@@ -99,14 +101,18 @@ def learned_outcome(
     from_episodes: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The reward or the policy that a learner finds, or both, and what it proves."""
-    outcome = learner.learn(problem, np.random.default_rng(seed))
+    outcome: Any = learner.learn(problem, np.random.default_rng(seed))
+    if not isinstance(outcome, Outcome):
+        raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(outcome).__name__}: expected an Outcome.")
+    if table is None and isinstance(outcome.reward, TabularReward):
+        raise InvalidReward("the reward is of rows of a table, and there is none: expected a LinearReward of observations.")
     if outcome.reward is not None:
         outcome.reward.save(folder / REWARD)
     if outcome.policy is not None:
         world.keep(outcome.policy, folder, LEARNED)
     known = None if table is None else (table, known_expert)
     write_json(folder / "certificate.json", certificate_of(outcome, known, episodes=from_episodes))
-    record = {"learner": type(learner).__name__, "how": outcome_of(learner), **outcome.record()}
+    record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
     if isinstance(problem.environment, Simulator):
         record["stats"]["inner"] = type(problem.environment.planner).__name__
     return record

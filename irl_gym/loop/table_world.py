@@ -166,6 +166,7 @@ class TableWorld:
         actions: Any = tabular_actions(policy, self.table.states)
         if isinstance(policy, TabularPolicy) and not (policy.probabilities.max(axis=1) == 1).all():
             actions = policy.probabilities
+        as_distribution(actions, self.mdp.n_states, self.mdp.n_actions)  # refuses what is no policy of this table
         if epsilon:
             actions = noisy(actions, epsilon, self.table.mdp.n_actions)
         np.savez(folder / ("expert.npz" if name == "expert" else f"{name}_policy.npz"), actions=actions)

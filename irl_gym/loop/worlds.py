@@ -120,7 +120,10 @@ class SteppedWorld:
     def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
         """Write an agent in SB3's zip, its algorithm and its noise as json."""
         if not isinstance(policy, Agent):
-            raise InvalidParameter(f"{type(policy).__name__} cannot be kept: expected an agent of SB3. Use SB3 as planner.")
+            raise InvalidParameter(
+                f"{type(policy).__name__} cannot be kept: expected, where there is no table, an agent of SB3. Use SB3 as "
+                "planner, or give an `irl_gym.agents.planners.Agent`."
+            )
         policy.save(folder / f"{name}.zip")
         write_json(folder / f"{name}.json", {"algorithm": type(policy.model).__name__, "epsilon": epsilon})
 

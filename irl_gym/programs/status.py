@@ -12,6 +12,7 @@ class Status(enum.Enum):
     """Does the reward say something: is there any to be paid?"""
 
     OPTIMAL = "optimal", True, "Optimal within the solver's tolerances."
+    LEARNED = "learned", True, "Learned; no program was solved."
     INACCURATE = (
         "inaccurate",
         True,

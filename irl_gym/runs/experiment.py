@@ -96,6 +96,9 @@ class Experiment:
                 f"start_seeds is {self.start_seeds!r} and reveal {self.reveal!r}, but the environment is the dataset's: "
                 "expected neither. Name env_id, or leave them out."
             )
+        if not is_dataclass(self.learner) or isinstance(self.learner, type) or not isinstance(self.learner, Learner):
+            what = "a frozen dataclass with `needs` and `learn`, such as FiniteLP()"
+            raise InvalidParameter(f"learner is {self.learner!r:.80}: expected {what}.")
         checked_epsilon(self.epsilon)
         checked_after_end(self.after_end)
         if self.dataset is not None and (self.expert is not None or self.epsilon):
@@ -144,11 +147,17 @@ MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""
 
 
+def class_name(value: Any) -> str:
+    """The name of an object's class; of one that is not of this library with its module, since two may have one name."""
+    kind = type(value)
+    return kind.__name__ if kind.__module__.partition(".")[0] == "irl_gym" else f"{kind.__module__}:{kind.__qualname__}"
+
+
 def as_config(value: Any) -> Any:
     """What json holds of a part of an experiment: of a large array, or an object without a text of its own, a digest."""
     if is_dataclass(value) and not isinstance(value, type):
         return {
-            "type": type(value).__name__,
+            "type": class_name(value),
             **{one.name: as_config(getattr(value, one.name)) for one in fields(value) if one.init},
         }
     if isinstance(value, Mapping):
@@ -184,7 +193,7 @@ def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
+def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, Any]:
     """Arguments of an environment given as text: `name=value` pairs, each value json or plain text; or one json object.
 
     `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
@@ -196,16 +205,16 @@ def parse_keywords(parts: Sequence[str]) -> dict[str, Any]:
         try:
             return json.loads(parts[0])
         except (ValueError, RecursionError) as error:
-            raise InvalidParameter(f"env-kwargs is {parts[0]!r:.200}, not json ({error}): expected an object.") from error
+            raise InvalidParameter(f"{what} is {parts[0]!r:.200}, not json ({error}): expected an object.") from error
     found: dict[str, Any] = {}
     for part in parts:
         name, equals, text = part.partition("=")
         if not equals or not name.isidentifier():
-            raise InvalidParameter(f"env-kwargs has {part!r}: expected name=value, such as map_name=8x8.")
+            raise InvalidParameter(f"{what} has {part!r}: expected name=value, such as map_name=8x8.")
         try:
             found[name] = json.loads(text)
         except ValueError:
             found[name] = text
         except RecursionError as error:
-            raise InvalidParameter(f"env-kwargs has {part!r:.40}, nested too deeply: expected plain json, or text.") from error
+            raise InvalidParameter(f"{what} has {part!r:.40}, nested too deeply: expected plain json, or text.") from error
     return found

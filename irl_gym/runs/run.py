@@ -173,6 +173,9 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     metrics = reader.read("metrics.json", lambda one: read_json(one, Metrics))
     on_table = metrics.get("table") is not None
     retrained = RETRAINED in metrics["policies"]  # not of a learner of policies: it gives no reward to retrain on
+    if retrained is not ("reward.npz" in stages["reward"]["files"]):
+        what = "metrics.json and .stages/reward.json do not agree on whether a reward was learned"
+        raise reader.incomplete(f"{what}; delete metrics.json, and it is made again")
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,

@@ -27,7 +27,12 @@ def put(content, to, value):
     [
         ("metrics.json", "policies", None, "its policies is None: expected an object"),
         ("metrics.json", "policies.expert.value", True, "its policies.expert.value is True: expected a number"),
-        ("metrics.json", "policies.retrained", ..., "its policies is .*: expected a policy retrained"),
+        (
+            "metrics.json",
+            "policies.retrained",
+            ...,
+            "its policies is .*: expected a policy that is judged, beside",
+        ),
         ("metrics.json", "reward.status", "splendid", "its reward.status is 'splendid': expected one of optimal, inaccurate"),
         ("metrics.json", "table.states", 16.5, "its table.states is 16.5: expected a whole number"),
         ("certificate.json", "optimality.margin", "wide", "its optimality.margin is 'wide': expected a list"),

@@ -128,8 +128,7 @@ def test_a_run_draws_its_figures(runs, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_metrics_have_the_documented_keys(runs, name):
     metrics = runs(name).metrics
-    known = {"policies", "score_reason", "expert_value", "reward", "training", "demonstrations", "table"}
-    assert set(metrics) == known
+    assert set(metrics) == {"policies", "score_reason", "expert_value", "reward", "training", "demonstrations", "table"}
     assert set(metrics["policies"]) == {"expert", "random", "retrained", *(["learned"] if name in TRAJECTORIES else [])}
     row = {"how", "value", "score", "mean_return", "return_low", "return_high", "return_share", "agreement"}
     assert all(set(one) == row for one in metrics["policies"].values())

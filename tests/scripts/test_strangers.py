@@ -55,6 +55,7 @@ def agreeing(folder, config):
     metrics = json.loads((folder / "metrics.json").read_text())
     if config["env_id"] is None:
         metrics["demonstrations"] |= {"given": True, "episodes_only": True}
+        metrics["policies"]["expert"]["how"] = f"known by {metrics['demonstrations']['episodes']} episodes of the dataset"
     else:
         environment = json.loads((folder / "environment.json").read_text())
         (folder / "environment.json").write_text(json.dumps(environment | {"id": config["env_id"]}))

@@ -16,9 +16,9 @@ from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.judging.diagnoses.evidence import Evidence, missed, too_little
+from irl_gym.judging.diagnoses.findings import NO_REWARD, counted
 from irl_gym.judging.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.judging.diagnoses.findings import Finding as Finding
-from irl_gym.judging.diagnoses.findings import counted
 from irl_gym.learners.base import Outcome
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
@@ -93,6 +93,8 @@ def doctor(
     """
     mdp = None if mdp is None else checked_mdp(mdp)
     learned = result if isinstance(result, Outcome) else None
+    if learned is not None and learned.reward is None:
+        return NO_REWARD
     if learned is None and mdp is None:
         what = "None" if result is None else f"a {type(result).__name__}, a reward without a proof,"
         raise InvalidParameter(f"result is {what} and mdp is None: expected a result, a table, or both.")

@@ -146,12 +146,12 @@ def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed:
     whose = "" if recomputed else ", as recorded"
     if "expert_optimal" in reward:
         yield "expert optimal under the reward", f"{answer(reward.get('expert_optimal'))}{whose}"
-    if policies[agent_of(policies)]["score"] is not None:
+    if metrics["training"]["environment_steps"] and policies[agent_of(policies)]["score"] is not None:
         steps = metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
 
 
-def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section:
+def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section | None:
     """The learned rewards, and once each environment's true one."""
     made: list[Panel] = []
     places = run_places(named)
@@ -164,6 +164,8 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
             made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))
+    if not made:
+        return None
     lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
     return Section("rewards", "Learned rewards", lead, made)
 

@@ -108,7 +108,7 @@ def learning(named: Mapping[str, Run]) -> Section:
     panel = Panel("curves", what.capitalize(), sentence_of(f"{ends}; {told}"), curves(series, levels, what), height=400)
     left = [letter for letter in named if f"run {letter}" not in series]
     lead = "What each agent earned under the true reward as it trained."
-    lead += f" Without a curve, as planned exactly or without a score: {', '.join(left)}." if left else ""
+    lead += f" Without a curve, as nobody was trained step by step, or without a score: {', '.join(left)}." if left else ""
     return Section("learning", TITLE, lead, [panel])
 
 

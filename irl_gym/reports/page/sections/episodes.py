@@ -41,7 +41,7 @@ def episodes(films: Mapping[str, Film], place: Map | None, policies: Mapping[str
         "One episode of each, from the same kind of start. Play them, or step with the buttons; the slider below each goes to "
         "any moment."
     )
-    titles = TITLES if RETRAINED in policies else TITLES | {"agent": "The learner's policy"}
+    titles = TITLES if RETRAINED in policies else TITLES | {"agent": "Learner's policy"}
     told = [_told(name, titles.get(name, name), film) for name, film in films.items()]
     return Section(*EPISODES, lead, (), "episodes", {"players": told}, {"episodes": {"players": players}})
 

@@ -20,11 +20,11 @@ def proved(certificate: Mapping[str, Any], recomputed: bool, table: Tabulation |
     of_reward, of_program = facts_in(certificate)
     parts = [
         {"title": f"Of the reward: {whence(recomputed)}", "lines": [(one.label, one.sentence) for one in of_reward]},
-        {"title": f"Of its program: {whence(False)}", "lines": [(one.label, one.sentence) for one in of_program]},
+        {"title": f"Of the learner: {whence(False)}", "lines": [(one.label, one.sentence) for one in of_program]},
     ]
     lead = "What the reward says of the expert, from the table, the expert and the reward alone, and what its learner proves."
     if table is not None and not of_reward:
-        lead = "What the learner proves of the policy that it gives."
+        lead = "What the learner says of the policy that it gives; none of it is computed again."
     elif table is None:
         lead = "What the learner proves. Without a table nothing is computed beside it."
     shown = {"parts": [one for one in parts if one["lines"]], "raw": raw}

@@ -26,7 +26,7 @@ def policies_table(metrics: Mapping[str, Any]) -> Section:
         "lines": [(one.heading, one.text(reward)) for one in lines],
         "note": " ".join(map(sentence_of, explained([*columns, *lines], metrics))),
     }
-    lead = "What each policy is worth in the environment as it is, and what the learned reward allows."
+    lead = "What each policy is worth in the environment as it is" + (", and what the learned reward allows." if lines else ".")
     return Section("summary", "Under the true reward", lead, (), "summary", table)
 
 

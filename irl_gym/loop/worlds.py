@@ -122,7 +122,7 @@ class SteppedWorld:
         if not isinstance(policy, Agent):
             raise InvalidParameter(
                 f"{type(policy).__name__} cannot be kept: expected, where there is no table, an agent of SB3. Use SB3 as "
-                "planner, or give an `irl_gym.agents.planners.Agent`."
+                "planner."
             )
         policy.save(folder / f"{name}.zip")
         write_json(folder / f"{name}.json", {"algorithm": type(policy.model).__name__, "epsilon": epsilon})

@@ -38,6 +38,8 @@ from irl_gym.tables.layouts import GridLayout
 from irl_gym.tables.table_files import TABLE, load_table
 from irl_gym.tables.tabulation import Tabulation
 
+METRICS = "metrics.json"
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -170,12 +172,12 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     if config.get("env_id") not in (None, env_id):
         what = f"{ENVIRONMENT} is of {env_id!r}: expected {config['env_id']!r}, as config.json has"
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
-    metrics = reader.read("metrics.json", lambda one: read_json(one, Metrics))
+    metrics = reader.read(METRICS, lambda one: read_json(one, Metrics))
     on_table = metrics.get("table") is not None
     retrained = RETRAINED in metrics["policies"]  # not of a learner of policies: it gives no reward to retrain on
     if retrained is not ("reward.npz" in stages["reward"]["files"]):
-        what = "metrics.json and .stages/reward.json do not agree on whether a reward was learned"
-        raise reader.incomplete(f"{what}; delete metrics.json, and it is made again")
+        what = f"{METRICS} and .stages/reward.json do not agree on whether a reward was learned"
+        raise reader.incomplete(f"{what}; delete {METRICS}, and it is made again")
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,

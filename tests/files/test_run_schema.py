@@ -33,7 +33,7 @@ def put(content, to, value):
             ...,
             "its policies is .*: expected a policy that is judged, beside",
         ),
-        ("metrics.json", "reward.status", "splendid", "its reward.status is 'splendid': expected one of optimal, inaccurate"),
+        ("metrics.json", "reward.status", "splendid", "its reward.status is 'splendid': expected one of optimal, learned"),
         ("metrics.json", "table.states", 16.5, "its table.states is 16.5: expected a whole number"),
         ("certificate.json", "optimality.margin", "wide", "its optimality.margin is 'wide': expected a list"),
         ("certificate.json", "proof.objective", float("nan"), "it is no json of text and numbers: NaN is no finite number"),

@@ -181,5 +181,5 @@ def test_names_are_printed_as_they_are_and_never_read_as_markup(tmp_path, name):
         tmp_path / name, score=None, share=None, reason=f"of {name}", policies=policies,
         facts=((), (Fact("status", f"it is {name}"),)), config={"env_kwargs": {"map": name}, "dataset": name},
     )  # fmt: skip
-    assert f"/{name}: dataset, reward" in text and f"/{name}/report.html in a browser" in text
+    assert f"/{name}: reward, certificate" in text and f"/{name}/report.html in a browser" in text
     assert f"(map={name})" in text and f"There is no score: of {name}." in text

@@ -94,7 +94,7 @@ def test_a_score_has_one_form(lake):
 def test_the_certificate_tells_the_facts_of_the_reward_and_those_of_its_program(lake):
     of_reward, of_program = section_of(proved, lake).shown["parts"]
     assert of_reward["title"] == "Of the reward: computed again for this page"
-    assert of_program["title"] == "Of its program: the run's own record"
+    assert of_program["title"] == "Of the learner: the run's own record"
     assert dict(of_program["lines"])["objective of the program"].endswith("to rounding the best possible")
     assert dict(of_reward["lines"])["expert optimal under it"].startswith("yes")
 
@@ -109,7 +109,7 @@ def test_facts_are_text_and_never_markup(lake, tmp_path):
 
 def test_why_there_are_no_pictures_is_a_sentence(lake):
     film = replace(lake.films["agent"], without_frames="the environment draws none")
-    section = episodes({"agent": film}, None)
+    section = episodes({"agent": film}, None, {"retrained": {}})
     assert section.shown["players"][0]["why"] == "The environment draws none."
 
 

@@ -98,6 +98,19 @@ def test_a_certificate_that_is_none_is_refused_and_the_mend_works(finished, unvo
     assert read_run(unvouched).certificate == read_run(finished).certificate
 
 
+def test_metrics_that_hide_the_reward_are_refused_and_made_again(finished, unvouched):
+    told = read_json(unvouched / "metrics.json")
+    told["policies"]["learned"] = told["policies"].pop("retrained")
+    write_json(unvouched / "metrics.json", told)
+    with pytest.raises(
+        RunIncomplete, match="do not agree on whether a reward was learned; delete metrics.json, and it is made"
+    ):
+        read_run(unvouched)
+    (unvouched / "metrics.json").unlink()
+    recover_and_retrain(asked(), unvouched)
+    assert read_run(unvouched).metrics == read_run(finished).metrics
+
+
 def test_values_by_episodes_are_said_to_be_the_record_s(run):
     policies = {**run.metrics["policies"], "expert": run.metrics["policies"]["expert"] | {"sampled_value": 1.0}}
     told = replace(run, metrics={**run.metrics, "policies": policies})

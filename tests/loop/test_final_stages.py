@@ -26,7 +26,8 @@ TIMED = re.compile(r"agent\.zip|tensorboard/.*|\.stages/.*")
 """Files that hold the time."""
 KILLED = """
 import os, signal, sys
-from irl_gym import Experiment, SB3, final_stages, recover_and_retrain
+from irl_gym import Experiment, SB3, recover_and_retrain
+from irl_gym.loop import final_stages
 setattr(final_stages, sys.argv[1], lambda *given, **more: os.kill(os.getpid(), signal.SIGKILL))
 recover_and_retrain(Experiment("FrozenLake-v1", 0.99, retrain=SB3(total_timesteps=2_048), **{asked}), sys.argv[2])
 """.replace("{asked}", repr(ASKED))

@@ -7,10 +7,6 @@ from typing import Any, Optional
 import pytest
 
 from irl_gym.errors import InvalidParameter
-from irl_gym.learners.base import takes
-from irl_gym.learners.linear_programs.feature import FeatureLP
-from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
 from irl_gym.loop.loop import MAKERS, Loop
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.worlds import SteppedWorld
@@ -94,26 +90,5 @@ def test_what_is_said_of_an_absent_section_is_of_something_that_a_section_needs(
     assert set(LACKS) <= {name for show in SECTIONS for name in needs(show)}
 
 
-@pytest.mark.parametrize("learner", [FiniteLP, FeatureLP, TrajectoryLP])
-def test_a_learner_takes_parts_of_the_loop(learner):
-    assert set(takes(learner)) <= set(parts(Loop)) | set(parts(TableWorld))
-
-
 def test_what_only_a_table_has_is_known_of_where_there_is_none():
     assert {"table", "mdp", "states", "true", "layout", "horizon"} <= set(parts(TableWorld)) & set(parts(SteppedWorld))
-
-
-@dataclass(frozen=True)
-class Curious:
-    """A learner that takes what there cannot be."""
-
-    takes = ("mdp", "gossip")
-
-    def fit(self, world, expert, /):
-        raise AssertionError("nothing can be given to it")
-
-
-def test_a_learner_that_takes_what_there_cannot_be_is_told_what_there_can(tmp_path):
-    loop = Loop(Experiment("FrozenLake-v1", 0.9, learner=Curious()), tmp_path / "run")
-    with pytest.raises(InvalidParameter, match=r"Curious needs 'gossip'.*There can be .*known_expert"):
-        _ = loop.lesson

@@ -12,7 +12,7 @@ from irl_gym.reports.comparison.comparison_page import MOST_RUNS, lettered
 from irl_gym.reports.comparison.ranked import learning
 from irl_gym.reports.page.sections import training
 
-CSS = (Path(training.__file__).parent / "assets" / "page.css").read_text()
+CSS = (Path(training.__file__).parents[1] / "assets" / "page.css").read_text()
 TO_CONES = np.array([[0.4122, 0.5363, 0.0514], [0.2119, 0.6807, 0.1074], [0.0883, 0.2817, 0.6300]])
 TO_OKLAB = np.array([[0.2105, 0.7936, -0.0041], [1.9780, -2.4286, 0.4506], [0.0259, 0.7828, -0.8087]])
 SEEN = {

@@ -102,9 +102,7 @@ def test_metrics_that_hide_the_reward_are_refused_and_made_again(finished, unvou
     told = read_json(unvouched / "metrics.json")
     told["policies"]["learned"] = told["policies"].pop("retrained")
     write_json(unvouched / "metrics.json", told)
-    with pytest.raises(
-        RunIncomplete, match="do not agree on whether a reward was learned; delete metrics.json, and it is made"
-    ):
+    with pytest.raises(RunIncomplete, match=r"whether a reward was learned; delete metrics\.json, and it is made again"):
         read_run(unvouched)
     (unvouched / "metrics.json").unlink()
     recover_and_retrain(asked(), unvouched)

@@ -181,7 +181,7 @@ def test_a_state_with_a_better_action_is_never_called_tied():
     R = np.array([0, 0, 0.5, 1.0, 0, 0.5])  # in 0 and 1 action 1 is better, in 4 too; 2 and 5 are as good
     found = certify(crossing(), np.array([0, 0, 0, 0, 1, 0]), R)
     assert found.marginless.tolist() == [0, 1] and found.violated.tolist() == [0, 1] and found.tied.tolist() == []
-    assert told(found)["violated"] == "in 2 states another action is better under it: 3 actions, by at most 0.5"
+    assert told(found)["violated"] == "in 2 states another action is better under it: 3 rows of (4), by at most 0.5"
     assert "tied" not in told(found) and "tied" not in str(found)
 
 

@@ -81,7 +81,7 @@ def test_slack_gives_up_the_state_in_which_a_noisy_expert_erred(demonstrate):
 def test_facts_tell_how_many_rows_are_violated_and_where_nothing_is_known(demonstrate):
     table, best, seen = demonstrate(TAXI, 1000, 0.1)
     found = both(learned((table, best, seen), slack=1.0)[0], table.mdp, most_frequent(seen))
-    most = f"{counted(len(found.violated_rows), 'action')}, by at most {found.worst_violation:.3g}"
+    most = f"{counted(len(found.violated_rows), 'row')} of (4), by at most {found.worst_violation:.3g}"
     assert f"in 1 state another action is better under it: {most}" in found.told
     assert f"in {found.unknown.size} states that can be reached nothing is known of it" in found.told
 

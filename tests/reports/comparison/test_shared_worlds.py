@@ -105,5 +105,5 @@ def test_curves_of_two_worlds_are_scores(lake, tmp_path):
 def test_a_run_without_a_curve_is_named_beside_the_curves(lake):
     planned = replace(lake, curve=Curve(*np.zeros((5, 0))))
     found = learning(lettered([lake, planned]))
-    assert found.lead.endswith("Without a curve, as planned exactly or without a score: B.")
+    assert found.lead.endswith("Without a curve, as nobody was trained step by step, or without a score: B.")
     assert "Without a curve" not in learning(lettered([lake, lake])).lead

@@ -52,3 +52,26 @@ class Copycat:
         known = self.needs.of(problem, self)
         actions = int(known.spaces.actions.n)
         return Outcome(None, Status.LEARNED, Told(0), policy=np.nan_to_num(smoothed(known.seen), nan=1 / actions))
+
+
+@dataclass(frozen=True)
+class Careless:
+    """A reward, with notes and a proof that no file can hold."""
+
+    what: str
+    needs: ClassVar[Needs] = Needs(("dynamics",))
+
+    def learn(self, problem, rng):
+        reward = TabularReward(np.zeros(problem.dynamics.n_states))
+        stats = {"spread": np.zeros(3)} if self.what == "stats" else {}
+        return Outcome(reward, Status.LEARNED, Wordy() if self.what == "facts" else Told(1), stats)
+
+
+class Wordy(Told):
+    """A proof with a label that nobody reads."""
+
+    def __init__(self):
+        super().__init__(1)
+
+    def facts(self):
+        return (Fact("x" * 81, "too long"),)

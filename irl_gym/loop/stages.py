@@ -4,6 +4,7 @@ A stage is one or several functions, of which those are called whose needs are t
 may be, and read from the dataset where there is one. Parts are those of `irl_gym.loop.loop.Loop.sources`.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,11 @@ from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import AfterEnd, left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
-from irl_gym.errors import InvalidParameter, InvalidReward
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward
 from irl_gym.features.linear_reward import LinearReward
+from irl_gym.files.metrics_schema import Certificate
 from irl_gym.files.run_folder import LOGS, write_json
+from irl_gym.files.run_schema import checked
 from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
 from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
@@ -31,7 +34,7 @@ from irl_gym.loop.worlds import World
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.runs.certificates import certificate_of
+from irl_gym.runs.certificates import certificate_of, facts_in
 from irl_gym.runs.experiment import class_name
 from irl_gym.runs.logs import log_scalars, logged
 from irl_gym.runs.scorecard import came_about, how_of, outcome_of, scorecard
@@ -111,11 +114,29 @@ def learned_outcome(
     if outcome.policy is not None:
         world.keep(outcome.policy, folder, LEARNED)
     known = None if table is None else (table, known_expert)
-    write_json(folder / "certificate.json", certificate_of(outcome, known, episodes=from_episodes))
+    certificate = certificate_of(outcome, known, episodes=from_episodes)
     record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
+    _check_kept(learner, certificate, record)
+    write_json(folder / "certificate.json", certificate)
     if isinstance(problem.environment, Simulator):
         record["stats"]["inner"] = type(problem.environment.planner).__name__
     return record
+
+
+def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mapping[str, Any]) -> None:
+    """Check what a learner proves and notes before it is written: nothing could read it otherwise.
+
+    Raises:
+        InvalidParameter: it is no json, or has an entry that is read and is of another kind.
+    """
+    try:
+        told = json.loads(json.dumps({"certificate": certificate, "record": record}, allow_nan=False))
+        facts_in(checked(told["certificate"], Certificate))
+    except (DamagedFile, TypeError, ValueError) as error:
+        raise InvalidParameter(
+            f"what {class_name(learner)} proves or notes cannot be kept: {error}. Expected json, whose known entries are of "
+            "their kind."
+        ) from error
 
 
 def retrained_agent(

@@ -26,7 +26,7 @@ from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.policies import as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import counted_table
-from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 
 ROUNDING = 1e-9
 """Share of the largest |R| up to which rewards are the same."""
@@ -162,11 +162,12 @@ def certify(
             `marginless` leave them out, one by one.
 
     Raises:
+        InvalidMDP: something else than a table.
         InvalidPolicy: an expert of the wrong shape or content.
         InvalidReward: a reward of the wrong shape.
         InvalidParameter: rows that the table does not have.
     """
-    reward = as_reward(reward)
+    mdp, reward = checked_mdp(mdp), as_reward(reward)
     reward.expected(mdp)  # checks the shape
     policy, known = completed(expert, mdp.n_states)
     distribution = as_distribution(policy, mdp.n_states, mdp.n_actions)

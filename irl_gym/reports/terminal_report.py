@@ -149,7 +149,11 @@ def _reward(certificate: Mapping[str, Any], metrics: Mapping[str, Any]) -> Table
     of_reward, of_program = facts_in(certificate)
     lines = shown(measures.REWARDS, [metrics["reward"]])
     measured = [Fact(one.heading, one.text(metrics["reward"])) for one in lines]
-    for one in (*of_reward, *measured, *of_program):
+    for one in (*of_reward, *measured):
+        table.add_row(Text(one.label), Text(one.sentence, COLOURS[one.mood]))
+    table.add_section()
+    table.add_row("of its learner", "what it says itself, as the run recorded it")
+    for one in of_program:
         table.add_row(Text(one.label), Text(one.sentence, COLOURS[one.mood]))
     table.caption = " ".join(explained(lines, metrics))
     table.caption_justify = "left"

@@ -178,13 +178,19 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     if retrained is not ("reward.npz" in stages["reward"]["files"]):
         what = f"{METRICS} and .stages/reward.json do not agree on whether a reward was learned"
         raise reader.incomplete(f"{what}; delete {METRICS}, and it is made again")
+    if not on_table and (path / TABLE).exists():
+        raise reader.incomplete(f"{METRICS} tells of no table, and {TABLE} is there; delete {METRICS}, and it is made again")
+    certificate = reader.read("certificate.json", read_certificate)
+    if not retrained and (certificate["optimality"] is not None or (path / "reward.npz").exists()):
+        what = "no agent was retrained, but certificate.json or reward.npz is of a reward"
+        raise reader.incomplete(f"{what}; delete certificate.json and {METRICS}, and they are made again")
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
         learned=reader.read("reward.npz", load_reward) if retrained else None,
         expert=reader.read("expert.npz", load_actions) if on_table else None,
         agent=reader.read("agent_policy.npz", load_actions) if retrained and on_table else None,
-        certificate=reader.read("certificate.json", read_certificate), metrics=metrics,
+        certificate=certificate, metrics=metrics,
         curve=reader.read("learning_curve.csv", read_curve) if retrained else NO_CURVE, stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one, Grid))),
         films={name: reader.read(f"films/{name}.json", load_film) for name in ("expert", "agent")

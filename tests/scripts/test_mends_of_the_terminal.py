@@ -1,7 +1,11 @@
 """The mends that the terminal names where it tells of a recovered reward are executed by the script itself, and serve."""
 
-import pytest
+from pathlib import Path
 
+import pytest
+from forgetting import without_digests
+
+from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.loop import loop
 
 CUT, OPEN, SHORT = 'desc=["SFF","HFG"]', 'desc=["SFF","FFG"]', 'desc=["SFG"]'
@@ -42,3 +46,17 @@ def test_a_mend_that_the_terminal_names_serves(told, complaint, mend, ill, mende
     said = told(*ill)
     assert complaint in said and mend in said
     assert [each for each in mended if complaint in told(*each)] == []
+
+
+def test_a_certificate_that_is_of_a_reward_where_none_was_learned_is_made_again(script, monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1])
+    learn = "recover_and_retrain", "--learner", "own_learners:Copycat", "--episodes", "5", "--out", "run"
+    assert script(*learn, cwd=tmp_path).returncode == 0
+    out = without_digests(tmp_path / "run")
+    held = read_json(out / "certificate.json")
+    write_json(out / "certificate.json", held | {"optimality": {"expert_optimal": True, "facts": []}})
+    mend = "delete certificate.json and metrics.json, and they are made again"
+    assert mend in script("report", "--run", "run", cwd=tmp_path).stderr
+    for name in ("certificate.json", "metrics.json"):
+        (out / name).unlink()
+    assert script(*learn, cwd=tmp_path).returncode == 0 and script("report", "--run", "run", cwd=tmp_path).returncode == 0

@@ -56,3 +56,11 @@ def test_options_reach_a_learner_of_ones_own(run):
 def test_an_option_of_another_learner_is_refused(run, arguments, told):
     done = run(*arguments)
     assert done.returncode == 2 and told in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(("what", "told"), [("stats", "ndarray is not JSON serializable"), ("facts", "has the label 'xxx")])
+def test_what_no_file_can_hold_is_refused_before_it_is_written(run, tmp_path, what, told):
+    done = run("own_learners:Careless", "--options", f"what={what}")
+    said = " ".join(done.stderr.split())
+    assert done.returncode == 2 and "Careless proves or notes cannot be kept" in said and told in said
+    assert not (tmp_path / "run" / "certificate.json").exists()

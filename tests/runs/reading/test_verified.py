@@ -109,6 +109,12 @@ def test_metrics_that_hide_the_reward_are_refused_and_made_again(finished, unvou
     assert read_run(unvouched).metrics == read_run(finished).metrics
 
 
+def test_metrics_that_hide_the_table_are_refused(unvouched):
+    write_json(unvouched / "metrics.json", {**read_json(unvouched / "metrics.json"), "table": None})
+    with pytest.raises(RunIncomplete, match=r"tells of no table, and table\.npz is there; delete metrics\.json"):
+        read_run(unvouched)
+
+
 def test_values_by_episodes_are_said_to_be_the_record_s(run):
     policies = {**run.metrics["policies"], "expert": run.metrics["policies"]["expert"] | {"sampled_value": 1.0}}
     told = replace(run, metrics={**run.metrics, "policies": policies})

@@ -4,10 +4,13 @@ An HDF5 file can name other files whose bytes stand for its numbers, link to obj
 place of numbers, and declare terabytes in a few bytes. Neither Minari nor D4RL writes any of these. So the tree is walked from
 its root, without reading a number, and everything but groups, and arrays of numbers, booleans or text that lie in the file
 itself, is refused. Values of any length, which are text and pictures, may all be one that lies in the file once: what they
-take together is counted, a few at a time.
+take together is counted, a few at a time. They lie in heaps, lists of objects of which each tells where the next one begins;
+HDF5's library goes for ever round one that tells its own place, so that these are walked first.
 """
 
+import mmap
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -45,6 +48,7 @@ def check_hdf5(path: str | os.PathLike) -> None:
     size, declared, of_any_length = os.path.getsize(path), 0, []
     try:
         with h5py.File(path, "r") as file:
+            _check_heaps(path, file.id.get_create_plist().get_sizes()[1])
             for name, one in _objects(file.id):
                 if isinstance(one, _low.h5d.DatasetID):
                     declared += _size(name, one)
@@ -98,6 +102,28 @@ def _objects(root: Any) -> Iterator[tuple[str, Any]]:
             elif not isinstance(one, _low.h5d.DatasetID):
                 raise DamagedFile(f"{name[:80]} is a type, and neither a group nor an array")
             yield name, one
+
+
+def _check_heaps(path: str | os.PathLike, width: int) -> None:
+    """Walk each list of values of any length, in which a number takes `width` bytes, as HDF5's library does (format, III.E).
+
+    Raises:
+        DamagedFile: one that does not come to its end.
+    """
+    head = -(-(8 + width) // 8) * 8  # bytes before the first object, and before the content of each
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as raw:
+
+        def number(place: int) -> int:
+            return int.from_bytes(raw[place + 8 : place + 8 + width], "little")
+
+        for found in re.finditer(rb"GCOL\x01\0\0\0", raw):
+            at, end = found.start() + head, found.start() + number(found.start())
+            while at + head <= min(end, len(raw)):
+                length = number(at)
+                step = head + -(-length // 8) * 8 if raw[at : at + 2] != b"\0\0" else length
+                if not 0 < step <= end - at:
+                    raise DamagedFile(f"its values of any length do not follow each other: one at byte {at} takes {step} bytes")
+                at += step
 
 
 def _size(name: str, dataset: Any) -> int:

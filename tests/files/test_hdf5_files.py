@@ -51,6 +51,20 @@ def test_texts_that_are_long_and_lie_in_the_file_are_no_damage(tmp_path, monkeyp
     check_hdf5(tmp_path / "a.hdf5")
 
 
+@pytest.mark.parametrize("length", [0, (1 << 64) - 16, 1 << 40])
+def test_a_list_of_texts_that_does_not_end_is_refused_where_hdf5_would_go_round_it_for_ever(tmp_path, length):
+    path = tmp_path / "a.hdf5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("text", data=["abc", "de"], dtype=h5py.string_dtype())
+    check_hdf5(path)
+    raw = path.read_bytes()
+    at = raw.index(b"GCOL") + 16 + 2 * 24  # the objects are a head of 16 bytes and a text in 8; then comes what is free
+    assert raw[at : at + 8] == bytes(8)
+    path.write_bytes(raw[: at + 8] + length.to_bytes(8, "little") + raw[at + 16 :])
+    with pytest.raises(DamagedFile, match="do not follow each other"):
+        check_hdf5(path)
+
+
 def test_texts_in_more_than_one_row_are_refused(tmp_path):
     with h5py.File(tmp_path / "a.hdf5", "w") as file:
         file.create_dataset("text", (2, 2), dtype=h5py.string_dtype())

@@ -226,15 +226,24 @@ def _answered(told: Any) -> Any:
     return told
 
 
-class Found(TypedDict):
-    """A finding of the doctor."""
+def _placed(told: Any) -> Any:
+    """Refuse a finding whose actions are not those of its states."""
+    if len(told["actions"]) not in (0, len(told["states"])):
+        raise ValueError("an action for each of its states, or none")
+    return told
 
+
+class _Found(TypedDict):
     name: Text
     sentence: Text
     mend: Text
     states: list[Count]
     actions: list[Count]
     flags: list[Flag]
+
+
+Found = Annotated[_Found, AfterValidator(_placed)]
+"""A finding of the doctor."""
 
 
 class _Diagnosed(TypedDict):

@@ -6,7 +6,6 @@ report      report.html, from what is on disk alone
 Parts are those of `irl_gym.loop.loop.Loop.sources`.
 """
 
-import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -143,8 +142,9 @@ def _path(learner: Any, mdp: TabularMDP, expert: Any, *, margin_cap: float | Non
         most_pieces=MOST_PIECES,
     )
     arrays = {name: getattr(found, name) for name in ("breakpoints", "rewards", "margins", "l1_norms", "total_margins")}
-    arrays |= {"gap": np.array(found.gap), "exact": np.array(found.exact)}
-    return arrays | {"changes": np.array(json.dumps([change.to_json() for change in found.changes]))}
+    cap = np.nan if found.margin_cap is None else found.margin_cap
+    numbers = {"gap": found.gap, "r_max": found.r_max, "margin_cap": cap}
+    return arrays | {name: np.array(one, dtype=float) for name, one in numbers.items()} | {"exact": np.array(found.exact)}
 
 
 def report(folder: Path, path: Path, table: Tabulation | None) -> dict[str, Any]:

@@ -14,12 +14,13 @@ from gymnasium import spaces
 
 from irl_gym.errors import InvalidInput, RunIncomplete
 from irl_gym.features.linear_reward import LinearReward, load_reward
-from irl_gym.files.archives import json_in, read_arrays
+from irl_gym.files.archives import read_arrays
 from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
 from irl_gym.files.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
+from irl_gym.judging.diagnoses.findings import row_of
 from irl_gym.judging.diagnoses.plain_words import with_names
 from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
@@ -80,8 +81,8 @@ class Run:
     widths: Mapping[str, np.ndarray] | None
     """low, high, width: (S,) how far the reward of a state is left open; NaN where it is never reached."""
     lambda_path: Mapping[str, Any] | None
-    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
-    exact, whether these are all pieces, and gap, what others can be worth."""
+    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,); exact, whether these
+    are all pieces, and gap, what others can be worth; r_max and margin_cap of its program, NaN where margins have no cap."""
     vouched: bool
     """Is a digest recorded of each file that was read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
@@ -120,9 +121,9 @@ class Run:
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
-    def worded(self, sentence: str) -> str:
-        """A sentence with states and actions by their names, where there is a table."""
-        return sentence if self.table is None else with_names(sentence, self.state_name, self.actions)
+    def place_name(self, state: int, action: int | None = None) -> str:
+        """A state, or a state and an action, by number, with their names behind where there is a table."""
+        return row_of(state, action) if self.table is None else with_names(state, action, self.state_name, self.actions)
 
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.
@@ -278,8 +279,5 @@ def _check_claims(told: Iterable[Claim], run: Run, reader: RunReader) -> None:
 
 
 def _part(path: Path, name: str) -> dict[str, Any] | None:
-    """The arrays whose names begin so; what is text is json."""
-    arrays = read_arrays(path)
-    found = {key: one for key, one in arrays.items() if key.startswith(f"{name}.")}
-    told = {key: json_in(arrays, key) if one.dtype.kind == "U" else one for key, one in found.items()}
-    return {key.partition(".")[2]: one for key, one in told.items()} or None
+    """The arrays whose names begin so."""
+    return {key.removeprefix(f"{name}."): one for key, one in read_arrays(path).items() if key.startswith(f"{name}.")} or None

@@ -5,7 +5,7 @@ import numpy as np
 from irl_gym._typing import Indices
 from irl_gym.errors import DegenerateExpert
 from irl_gym.judging.diagnoses.case import Case, Rows
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.judging.diagnoses.mends import DEFAULTS, Mend, breaking, on_steps
 
 
@@ -27,7 +27,7 @@ def violated(case: Case) -> Finding | None:
 def _found(name: str, told: str, mend: Mend, rows: Rows, which: np.ndarray) -> Finding:
     """A finding about some rows (k,); its sentence has {states}, how many there are, and {where}, the first of them."""
     states, actions = rows.states[which], rows.actions[which]
-    sentence = told.format(states=counted(np.unique(states).size), where=named(states, actions))
+    sentence = told.format(states=counted(np.unique(states).size), where=WHERE)
     return Finding(name, sentence, mend[0], states, tuple(actions.tolist()), mend[1])
 
 

@@ -248,7 +248,7 @@ def _doctors(named: Mapping[str, Run]) -> Section:
         said = told_answer(run.diagnosis) if run.diagnosis else "Not looked at, by the earlier version of irl_gym that made it."
         answers.setdefault(said, []).append(letter)
         for one in run.diagnosis["findings"] if run.diagnosis else ():
-            told = finding(one, run.worded, given=run.config.get("dataset") is not None)
+            told = finding(one, run.place_name, given=run.config.get("dataset") is not None)
             findings.append({**told, "name": f"run {letter}: {told['name']}"})
     lead = "What is to be said against each reward, and what to do about it. " if findings else ""
     lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())

@@ -7,6 +7,7 @@ from certified import both
 from models import paper_grid
 from patients import finding, judged, names, partly_contradicted
 
+from irl_gym.judging.diagnoses.findings import told_finding
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
@@ -24,7 +25,9 @@ def lake(toy_text, name="FrozenLake 4x4 slippery"):
 
 def test_an_expert_that_is_not_optimal_is_told_with_states_and_actions():
     said = finding("expert-not-optimal", judged(GRID.mdp, GRID.expert, -GRID.R), GRID.mdp, GRID.expert)
-    assert said.states.size == len(said.actions) > 0 and f"s={said.states[0]} a={said.actions[0]}" in said.sentence
+    assert said.states.size == len(said.actions) > 0 and f"s={said.states[0]} a={said.actions[0]}" in told_finding(
+        said.to_json()
+    )
 
 
 def test_the_defaults_mend_an_expert_that_is_not_optimal():

@@ -118,11 +118,11 @@ def path_of(mdp, expert, reward_on):
     found = [FiniteLP(l1=float(l1), reward_on=reward_on).fit(mdp, expert) for l1 in (0.0, *(ends[1:-1] + 0.01 * top))]
     margins = np.stack([certify(mdp, expert, one.reward).margin for one in found])
     rewards = np.stack([one.reward.values for one in found])
-    changes = [{"sentence": f"At price {at:.3g} a reward becomes 0."} for at in ends]
     norms = np.abs(rewards).sum(axis=1)
     return {
         "breakpoints": ends, "rewards": rewards, "margins": margins, "l1_norms": norms,
-        "total_margins": np.nansum(margins, axis=1), "changes": changes,
+        "total_margins": np.nansum(margins, axis=1), "gap": np.array(0.0), "exact": np.array(True),
+        "r_max": np.array(1.0), "margin_cap": np.array(np.nan),
     }  # fmt: skip
 
 

@@ -65,9 +65,10 @@ def test_what_is_too_large_is_told_in_a_sentence(need):
 
 
 def test_the_slider_calls_states_as_figures_do(lake):
-    path = {**lake.lambda_path, "changes": [{"sentence": "At price 1 the reward of states 4, 14 becomes 0."}] * 7}
-    data = section_of(lambda_slider, replace(lake, lambda_path=path)).script["slider"]
-    assert data["pieces"][0]["change"] == "At price 1 the reward of (row 1, column 0) and (row 3, column 2) becomes 0."
+    rewards = np.zeros_like(lake.lambda_path["rewards"])
+    rewards[0, [4, 14]] = 0.5
+    data = section_of(lambda_slider, replace(lake, lambda_path={**lake.lambda_path, "rewards": rewards})).script["slider"]
+    assert "the reward of (row 1, column 0) and (row 3, column 2) becomes 0; " in data["pieces"][1]["change"]
 
 
 @pytest.mark.parametrize(

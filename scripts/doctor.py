@@ -29,6 +29,7 @@ from irl_gym.judging.diagnoses.findings import row_of, told_answer, told_finding
 from irl_gym.judging.diagnoses.plain_words import usable_flags
 from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
 from irl_gym.runs.run import Run, read_run
+from irl_gym.runs.supply import supplied
 
 CODES = {"healthy": 0, "findings": 1, "not examined": 3}
 """What the script exits with, by the doctor's answer."""
@@ -82,7 +83,7 @@ def main(arguments: Arguments) -> int:
     console, unfinished, run = Console(soft_wrap=True), None, None
     try:
         run = read_run(arguments.run)
-        diagnosis = diagnose_run(run)
+        diagnosis = supplied(diagnose_run, run)
     except (IrlGymError, OSError) as error:
         unfinished = error
         diagnosis = left(arguments.run) if isinstance(error, RunIncomplete) else None

@@ -174,7 +174,7 @@ class Stats(TypedDict, total=False):
     rounds: list[Any]
     best_round: Count
     best_by: Text
-    inner: Text
+    exact_planner: bool
     expert_episodes: Count
     episodes_dropped: Count
 

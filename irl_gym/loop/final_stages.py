@@ -20,7 +20,7 @@ from irl_gym.files.run_folder import write_json
 from irl_gym.judging.ambiguity.lambda_path import lambda_path
 from irl_gym.judging.ambiguity.widths import feasible_widths
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose, weights_of
+from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose
 from irl_gym.judging.diagnoses.findings import NO_REWARD
 from irl_gym.learners.base import Learner
 from irl_gym.loop.filming import film
@@ -80,10 +80,9 @@ def diagnosis(
     shaping: bool, judged: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     """What the doctor says. An examination that fails does not undo the run: the diagnosis says why."""
-    status = Status(solved["status"])
-    case = Case(
-        mdp, known_expert, tabular, claims_in(certificate), status, solved["stats"], true, shaping, judged, weights_of(learned)
-    )
+    status, weights = Status(solved["status"]), None if learned is None else learned.alpha
+    claims = claims_in(certificate)
+    case = Case(mdp, known_expert, tabular, claims, status, solved["stats"], true, shaping, judged, weights)
     try:
         found = NO_REWARD if learned is None else diagnose(case)
     except IrlGymError as error:

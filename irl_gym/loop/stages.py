@@ -14,7 +14,6 @@ import numpy as np
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
-from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import AfterEnd, left_out
@@ -107,7 +106,7 @@ def learned_outcome(
     outcome: Any = learner.learn(problem, np.random.default_rng(seed))
     if not isinstance(outcome, Outcome):
         raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(outcome).__name__}: expected an Outcome.")
-    if table is None and isinstance(outcome.reward, TabularReward):
+    if table is None and outcome.reward is not None and outcome.reward.alpha is None:
         raise InvalidReward("the reward is of rows of a table, and there is none: expected a LinearReward of observations.")
     if outcome.reward is not None:
         outcome.reward.save(folder / REWARD)
@@ -118,8 +117,8 @@ def learned_outcome(
     record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
     _check_kept(learner, certificate, record)
     write_json(folder / "certificate.json", certificate)
-    if isinstance(problem.environment, Simulator):
-        record["stats"]["inner"] = type(problem.environment.planner).__name__
+    if problem.environment is not None:
+        record["stats"]["exact_planner"] = bool(getattr(problem.environment, "exact", False))
     return record
 
 

@@ -34,11 +34,11 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         run: what a run left.
         path: of the file.
     """
-    sections = list(sections_of(run))
+    sections = list(sections_of(Contents(run), run))
     context = {
         "title": page_title(run.env_id, run.config),
         "facts": supplied(facts, run),
-        "verdict": verdict(run.metrics, recomputed=run.recomputed),
+        "verdict": supplied(verdict, run),
         "sections": sections,
     }
     data: dict[str, Any] = {"figures": specs(sections), "slider": None, "episodes": {}}
@@ -47,12 +47,15 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
     write_page(path, "report.html", context, data, SCRIPTS)
 
 
-def sections_of(run: Run) -> Iterator[Section]:
-    """The sections of a run's page, or in place of one why it is absent."""
-    contents = Contents(run)
+def sections_of(*sources: Any) -> Iterator[Section]:
+    """The sections of a page, or in place of one why it is absent.
+
+    Args:
+        sources: who supplies what they need, such as a run's contents and the run.
+    """
     for show in SECTIONS:
-        need = missing(show, contents, run)
-        section = supplied(show, contents, run) if need is None else absent(need, run.stages)
+        need = missing(show, *sources)
+        section = supplied(show, *sources) if need is None else supplied(absent, *sources, need=need)
         if section is not None:
             yield section
 

@@ -82,8 +82,6 @@ def test_the_version_is_told_once():
 def test_no_function_takes_a_whole_run_but_those_whose_subject_it_is():
     taken = set()
     for where, tree in modules().items():
-        if where.parts[0] == "tables":  # a Run there is one of an environment's step
-            continue
         for one in ast.walk(tree):
             if isinstance(one, ast.FunctionDef):
                 asked = [each.annotation for each in (*one.args.posonlyargs, *one.args.args, *one.args.kwonlyargs)]
@@ -102,6 +100,18 @@ def test_nobody_asks_for_the_class_of_a_learner_or_a_world_but_its_own_room(room
         if isinstance(one, ast.Call) and ast.unparse(one.func) in ("isinstance", "issubclass") and names(one.args[1]) & kinds
     }
     assert len(kinds) >= 3 and [one for one in asked if not one.startswith(AT_HOME[room])] == []
+
+
+def test_the_name_of_a_class_means_one_thing():
+    said: dict[str, set[str]] = {}
+    for where, tree in modules().items():
+        for one in tree.body:
+            targets = one.targets if isinstance(one, ast.Assign) else [one] if isinstance(one, ast.ClassDef) else []
+            for name in (getattr(target, "name", None) or getattr(target, "id", "") for target in targets):
+                if re.fullmatch(r"[A-Z]\w*[a-z]\w*", name):
+                    said.setdefault(name, set()).add(where.as_posix())
+    twice = {name: found for name, found in said.items() if len(found) > 1}
+    assert {*twice} <= {"OnProgress", "Progress", "Table"}  # callbacks; phi in a table, and the flags that make one
 
 
 def test_no_report_parses_a_text():

@@ -24,7 +24,7 @@ from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose
 from irl_gym.judging.diagnoses.findings import NO_REWARD
 from irl_gym.learners.base import Learner
 from irl_gym.loop.filming import film
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import Episode, seen_parts
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -44,7 +44,7 @@ MOST_STEPS = 2_500
 
 
 def films(
-    folder: Path, world: World, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
+    folder: Path, world: RunWorld, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
     expert: Any, agent: Any, learned_policy: Any, learned: TabularReward | LinearReward | None, seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """An episode of the expert, the first of a dataset where one was given, and one of the agent, which without a reward is the

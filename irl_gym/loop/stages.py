@@ -29,7 +29,7 @@ from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner, Outcome
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
@@ -45,7 +45,9 @@ OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
 
 
-def planned_expert(folder: Path, teacher: Planner, world: World, epsilon: float, report_progress: OnProgress) -> dict[str, Any]:
+def planned_expert(
+    folder: Path, teacher: Planner, world: RunWorld, epsilon: float, report_progress: OnProgress
+) -> dict[str, Any]:
     """An expert that plans, or learns, under the true reward."""
     policy = world.train(logged(teacher, folder / LOGS / "expert"), None, _share(report_progress, "expert", teacher))
     world.keep(policy, folder, "expert", epsilon)
@@ -72,7 +74,7 @@ def recorded_episodes(
 
 
 def played_episodes(
-    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: World, expert: Any, gamma: float, episodes: int,
+    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: RunWorld, expert: Any, gamma: float, episodes: int,
     eval_episodes: int, seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """Episodes of an expert that was planned, as a Minari dataset."""
@@ -99,7 +101,7 @@ def played_episodes(
 
 
 def learned_outcome(
-    folder: Path, learner: Learner, problem: Problem, world: World, seed: int, table: Tabulation | None, known_expert: Any,
+    folder: Path, learner: Learner, problem: Problem, world: RunWorld, seed: int, table: Tabulation | None, known_expert: Any,
     from_episodes: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The reward or the policy that a learner finds, or both, and what it proves."""
@@ -139,7 +141,7 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
 
 
 def retrained_agent(
-    folder: Path, retrainer: Planner, world: World, learned: TabularReward | LinearReward, shaping: bool,
+    folder: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
     certificate: Mapping[str, Any], report_progress: OnProgress,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
@@ -156,7 +158,7 @@ def retrained_agent(
 
 
 def metrics(
-    folder: Path, world: World, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
+    folder: Path, world: RunWorld, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
     demonstrations: list[Episode], from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None,
     horizon: int | None, tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
     certificate: Mapping[str, Any], curve: Curve,

@@ -169,7 +169,7 @@ class SteppedWorld:
         return glanced, None
 
 
-World = TableWorld | SteppedWorld
+RunWorld = TableWorld | SteppedWorld
 """Where a run takes place."""
 
 

@@ -197,7 +197,7 @@ def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, 
     `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
 
     Raises:
-        InvalidParameter: neither.
+        InvalidParameter: neither, or a name twice.
     """
     if len(parts) == 1 and parts[0].lstrip().startswith("{"):
         try:
@@ -209,6 +209,8 @@ def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, 
         name, equals, text = part.partition("=")
         if not equals or not name.isidentifier():
             raise InvalidParameter(f"{what} has {part!r}: expected name=value, such as map_name=8x8.")
+        if name in found:
+            raise InvalidParameter(f"{what} has {part!r} after {name}={found[name]!r}: expected each name once. Leave one out.")
         try:
             found[name] = json.loads(text)
         except ValueError:

@@ -18,7 +18,7 @@ from irl_gym.files.archives import read_arrays
 from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
-from irl_gym.files.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
+from irl_gym.files.run_schema import Config, Diagnosed, EnvironmentFile, Grid, Version, checked
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
 from irl_gym.judging.diagnoses.findings import row_of
 from irl_gym.judging.diagnoses.plain_words import with_names
@@ -215,7 +215,7 @@ def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str
 
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    content = read_json(path, Environment)
+    content = read_json(path, EnvironmentFile)
     return content["id"], told_space("observations", content["observations"]), tuple(content["actions"])
 
 

@@ -32,7 +32,7 @@ SMALL = 2_000
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class JudgedRows:
     """The rows of (4), with what they are worth under R."""
 
     states: np.ndarray
@@ -188,11 +188,11 @@ class Case:
         return float(self.mdp.d0 @ self.true_optimum.error) + 64 * EPSILON * size
 
     @cached_property
-    def rows(self) -> Rows | None:
+    def rows(self) -> JudgedRows | None:
         """The rows of (4); None without a table or an expert."""
         return self.rows_at(None) if self.has_expert else None
 
-    def rows_at(self, gamma: float | None) -> Rows:
+    def rows_at(self, gamma: float | None) -> JudgedRows:
         """The rows of (4) for another discount, or for the table's own."""
         assert self.mdp is not None
         keep = self.states
@@ -210,7 +210,7 @@ class Case:
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
         usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
-        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
+        return JudgedRows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
 
     @property
     def _kept(self) -> np.ndarray:

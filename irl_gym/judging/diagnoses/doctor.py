@@ -15,7 +15,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.evidence import Evidence, missed, too_little
+from irl_gym.judging.diagnoses.evidence import EvidenceName, missed, too_little
 from irl_gym.judging.diagnoses.findings import NO_REWARD, counted
 from irl_gym.judging.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.judging.diagnoses.findings import Finding as Finding
@@ -24,7 +24,7 @@ from irl_gym.mdp.rewards import TabularReward, as_reward, in_table
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.spaces.states import States
 
-CHECKS: Mapping[Callable[[Case], Finding | None], tuple[Evidence, ...]] = {
+CHECKS: Mapping[Callable[[Case], Finding | None], tuple[EvidenceName, ...]] = {
     nothing.lambda_above_lambda_0: ("certificate",),
     nothing.zero_weights: ("certificate",),
     nothing.nothing_to_compare: ("expert",),

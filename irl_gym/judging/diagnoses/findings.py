@@ -45,7 +45,7 @@ class Finding:
         }
 
 
-Answer = Literal["healthy", "findings", "not examined"]
+Health = Literal["healthy", "findings", "not examined"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Diagnosis:
     """Why too little could be looked at to call the reward healthy; None where enough was."""
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> Health:
         """What is wrong was found, or nothing is wrong, or that cannot be said."""
         return "findings" if self.findings else "healthy" if self.why is None else "not examined"
 

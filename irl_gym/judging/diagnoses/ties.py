@@ -4,7 +4,7 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.errors import DegenerateExpert
-from irl_gym.judging.diagnoses.case import Case, Rows
+from irl_gym.judging.diagnoses.case import Case, JudgedRows
 from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.judging.diagnoses.mends import DEFAULTS, Mend, breaking, on_steps
 
@@ -24,7 +24,7 @@ def violated(case: Case) -> Finding | None:
     return _found("expert-not-optimal", told, _obey(case), rows, which)
 
 
-def _found(name: str, told: str, mend: Mend, rows: Rows, which: np.ndarray) -> Finding:
+def _found(name: str, told: str, mend: Mend, rows: JudgedRows, which: np.ndarray) -> Finding:
     """A finding about some rows (k,); its sentence has {states}, how many there are, and {where}, the first of them."""
     states, actions = rows.states[which], rows.actions[which]
     sentence = told.format(states=counted(np.unique(states).size), where=WHERE)
@@ -74,7 +74,7 @@ def same_successors(case: Case) -> Finding | None:
     return _found("same-successors", told, (mend or 'reward_on="state-action".', on_steps(case)), rows, which)
 
 
-def _marginless(rows: Rows) -> np.ndarray:
+def _marginless(rows: JudgedRows) -> np.ndarray:
     """(k,) rows that a reward of this kind can move and that have no margin, without being violated."""
     return np.flatnonzero(rows.usable & rows.tied)
 
@@ -118,7 +118,7 @@ def unsettled(case: Case) -> Finding | None:
     return _found("within-sampling-error", told, mend, rows, which)
 
 
-def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:
+def _split(case: Case) -> tuple[JudgedRows | None, Indices, Indices, bool]:
     """The rows of (4); those without a margin that another reward breaks; those that none does; is the split not known?"""
     rows, none = case.rows, np.zeros(0, dtype=np.int64)
     if rows is None or not (case.speaks and case.judges_states):

@@ -8,8 +8,8 @@ from typing import Any
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.curves import Curve
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.reports.comparison.shared_worlds import Rows, one_scale, one_world, run_places
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.comparison.shared_worlds import PolicyRows, one_scale, one_world, run_places
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.report import page_title
 from irl_gym.reports.page.scene import Scene
 from irl_gym.runs.pooling import Pool
@@ -48,7 +48,7 @@ class ComparedRuns:
         return self._each(lambda run: run.metrics)
 
     @cached_property
-    def policies(self) -> Mapping[str, Rows]:
+    def policies(self) -> Mapping[str, PolicyRows]:
         """How good each policy is."""
         return self._each(lambda run: run.metrics["policies"])
 
@@ -85,7 +85,7 @@ class ComparedRuns:
     @cached_property
     def scenes(self) -> Mapping[str, Scene | None]:
         """What is known state by state."""
-        return self._each(lambda run: Contents(run).scene)
+        return self._each(lambda run: RunContents(run).scene)
 
     @cached_property
     def curves(self) -> Mapping[str, Curve]:

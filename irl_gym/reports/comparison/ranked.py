@@ -12,7 +12,7 @@ import numpy as np
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, score_of
 from irl_gym.reports.comparison.pooled import averaged, returned, spoken
-from irl_gym.reports.comparison.shared_worlds import Rows, agree, levels_of, levels_told, worth
+from irl_gym.reports.comparison.shared_worlds import PolicyRows, agree, levels_of, levels_told, worth
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.reports.page.sections.training import curves as drawn
@@ -23,7 +23,7 @@ from irl_gym.written import number, sentence_of
 TITLE = "Learning curves"
 
 
-def sentence(policies: Mapping[str, Rows], pools: Sequence[Pool], same_world: bool, same_scale: bool) -> str:
+def sentence(policies: Mapping[str, PolicyRows], pools: Sequence[Pool], same_world: bool, same_scale: bool) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
     who = "retrained agent" if {agent_of(rows) for rows in policies.values()} == {RETRAINED} else "agent"
     scores = {letter: _agent(rows)["score"] for letter, rows in policies.items()}
@@ -52,18 +52,18 @@ def sentence(policies: Mapping[str, Rows], pools: Sequence[Pool], same_world: bo
     )
 
 
-def _agent(rows: Rows) -> Mapping[str, Any]:
+def _agent(rows: PolicyRows) -> Mapping[str, Any]:
     """The row of the policy that is spoken of."""
     return rows[agent_of(rows)]
 
 
-def _earned(rows: Rows) -> str:
+def _earned(rows: PolicyRows) -> str:
     """A score with its mean return."""
     row = _agent(rows)
     return f"{score_of(row['score'])} with mean return {number(row['mean_return'])}"
 
 
-def _ends(policies: Mapping[str, Rows]) -> str:
+def _ends(policies: Mapping[str, PolicyRows]) -> str:
     """What random actions and the expert return."""
     random, expert = (_spread([rows[name]["mean_return"] for rows in policies.values()]) for name in (RANDOM, EXPERT))
     return f"random actions have {random}, the expert {expert}"
@@ -74,14 +74,14 @@ def _spread(found: Sequence[float]) -> str:
     return " to ".join(dict.fromkeys(map(number, (min(found), max(found)))))
 
 
-def _otherwise(policies: Mapping[str, Rows], best: str) -> str:
+def _otherwise(policies: Mapping[str, PolicyRows], best: str) -> str:
     """Which run has the highest mean return, if that is not the one with the best score."""
     returns = {letter: _agent(rows)["mean_return"] for letter, rows in policies.items()}
     most = max(returns, key=lambda one: returns[one])
     return "" if returns[most] == returns[best] else f" The highest mean return is that of run {most}, {number(returns[most])}."
 
 
-def _unlike(policies: Mapping[str, Rows], same_world: bool) -> str:
+def _unlike(policies: Mapping[str, PolicyRows], same_world: bool) -> str:
     """Why scores are not on one scale."""
     if not same_world:
         return "The environments differ"
@@ -89,7 +89,7 @@ def _unlike(policies: Mapping[str, Rows], same_world: bool) -> str:
     return f"In these runs {apart} not worth the same"
 
 
-def learning(curves: Mapping[str, Curve], policies: Mapping[str, Rows], same_world: bool) -> Section:
+def learning(curves: Mapping[str, Curve], policies: Mapping[str, PolicyRows], same_world: bool) -> Section:
     """All learning curves in one figure."""
     trained = {letter: one for letter, one in curves.items() if len(one.steps)}
     if not trained:
@@ -113,7 +113,7 @@ def learning(curves: Mapping[str, Curve], policies: Mapping[str, Rows], same_wor
     return Section("learning", TITLE, lead, [panel])
 
 
-def _scores(curve: Curve, rows: Rows) -> tuple[np.ndarray, np.ndarray, None] | None:
+def _scores(curve: Curve, rows: PolicyRows) -> tuple[np.ndarray, np.ndarray, None] | None:
     """A learning curve in scores; None where the expert is no better than random actions."""
     low, high = (rows[policy]["value"] for policy in (RANDOM, EXPERT))
     if low is None or high is None or not high > low:

@@ -15,7 +15,7 @@ from irl_gym.reports.page.sections.asked import written
 from irl_gym.reports.page.sections.training import COLOURS, Level, stroke, usual_levels
 from irl_gym.runs.pooling import without_seeds
 
-Rows = Mapping[str, Any]
+PolicyRows = Mapping[str, Any]
 """What metrics.json says of each policy of a run, by its name."""
 WORLD = ("gamma", "start_seeds", "reveal", "bins", "samples", "table")
 """Entries of a configuration that make another world of an environment."""
@@ -76,7 +76,7 @@ def _dataset(config: Mapping[str, Any]) -> tuple[str, ...]:
     return () if config.get("env_id") is not None else ("dataset", "dataset_root")
 
 
-def worth(policies: Mapping[str, Rows], policy: str) -> dict[str, float | None]:
+def worth(policies: Mapping[str, PolicyRows], policy: str) -> dict[str, float | None]:
     """What a policy, such as expert or random, is worth in each run; None where that is not known."""
     return {letter: rows[policy]["value"] for letter, rows in policies.items()}
 
@@ -90,12 +90,12 @@ def agree(values: Mapping[str, float | None]) -> bool:
     return bool(np.ptp(found) <= SAME * np.abs(found).max(initial=0.0))
 
 
-def one_scale(policies: Mapping[str, Rows]) -> bool:
+def one_scale(policies: Mapping[str, PolicyRows]) -> bool:
     """Is a score of one run as much as the same score of another in this world?"""
     return all(agree(worth(policies, policy)) for policy in REFERENCES)
 
 
-def levels_of(drawn: Mapping[str, Mapping[str, Rows]]) -> list[Level]:
+def levels_of(drawn: Mapping[str, Mapping[str, PolicyRows]]) -> list[Level]:
     """The levels in a figure of values: one where all runs agree, else one for each curve, in its colour.
 
     Args:

@@ -15,7 +15,7 @@ from irl_gym.runs.run import Run
 
 
 @dataclass(frozen=True, eq=False)
-class Contents:
+class RunContents:
     """Supplies sections (`irl_gym.runs.supply`)."""
 
     run: Run

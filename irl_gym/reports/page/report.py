@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.document import write_page
 from irl_gym.reports.page.sections import compared, episodes, slider, training
 from irl_gym.reports.page.sections.absent import absent
@@ -34,7 +34,7 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         run: what a run left.
         path: of the file.
     """
-    sections = list(sections_of(Contents(run), run))
+    sections = list(sections_of(RunContents(run), run))
     context = {
         "title": page_title(run.env_id, run.config),
         "facts": supplied(facts, run),

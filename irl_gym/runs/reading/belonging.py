@@ -10,7 +10,7 @@ import numpy as np
 
 from irl_gym.tables.layouts import GridLayout
 
-AGAIN = "delete it, and its stage is run again"
+MADE_AGAIN = "delete it, and its stage is run again"
 WIDTHS = ("low", "high", "width")
 
 
@@ -32,17 +32,17 @@ def strangers(
         yield f"environment.json names {len(actions)} actions, but the table has {shape[1]}; delete it, and it is written again"
     for name, found in {**rewards, **policies}.items():
         if found.shape not in (shape, shape[:1]):
-            yield f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; {AGAIN}"
+            yield f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; {MADE_AGAIN}"
     for name, policy in policies.items():
         if policy.ndim == 1 and policy.max(initial=0) >= shape[1]:
-            yield f"{name} has action {policy.max()} of {shape[1]}; {AGAIN}"
+            yield f"{name} has action {policy.max()} of {shape[1]}; {MADE_AGAIN}"
     if grid is not None and (grid.n_cells > shape[0] or len(grid.directions) != shape[1]):
         cells = f"{grid.n_cells} cells and {len(grid.directions)} actions"
-        yield f"grid.json has {cells} for a table of {shape[0]} states and {shape[1]} actions; {AGAIN}"
+        yield f"grid.json has {cells} for a table of {shape[0]} states and {shape[1]} actions; {MADE_AGAIN}"
     for found in (diagnosis or {}).get("findings", ()):
         for name, n in (("states", shape[0]), ("actions", shape[1])):
             if (most := max(found[name], default=0)) >= n:
-                yield f"diagnosis.json has {most} among the {name} of {found['name']!r:.60}, of {n} in the table; {AGAIN}"
+                yield f"diagnosis.json has {most} among the {name} of {found['name']!r:.60}, of {n} in the table; {MADE_AGAIN}"
 
 
 def left_open(
@@ -59,7 +59,7 @@ def left_open(
         kinds = [np.asarray(widths.get(name, ())) for name in WIDTHS]
         odd = [one.shape for one in kinds if one.shape != kinds[0].shape or one.dtype.kind != "f" or np.isinf(one).any()]
         if odd or kinds[0].shape not in (shape, shape[:1]):
-            yield f"ambiguity.npz has widths of shape {(odd or [kinds[0].shape])[0]} for {shape[0]} states; {AGAIN}"
+            yield f"ambiguity.npz has widths of shape {(odd or [kinds[0].shape])[0]} for {shape[0]} states; {MADE_AGAIN}"
     if path is None:
         return
     k, R = np.size(path.get("l1_norms", ())), np.shape(path.get("rewards", ()))[1:]
@@ -70,9 +70,9 @@ def left_open(
         numbers = one.dtype.kind in "fb" and (name == "gap" or not np.isinf(one).any())
         fine = numbers and (name in ("gap", "margins", "margin_cap") or not np.isnan(one).any())
         if one.shape != expected or not fine or R not in (shape, shape[:1]):
-            yield f"ambiguity.npz has a path with {name} of shape {one.shape} for {shape[0]} states; {AGAIN}"
+            yield f"ambiguity.npz has a path with {name} of shape {one.shape} for {shape[0]} states; {MADE_AGAIN}"
     r_max, cap = (float(path[name]) for name in ("r_max", "margin_cap"))
     if r_max <= 0 or cap <= 0:
-        yield f"ambiguity.npz has a path with r_max {r_max:g} and margin_cap {cap:g}: expected both above 0; {AGAIN}"
+        yield f"ambiguity.npz has a path with r_max {r_max:g} and margin_cap {cap:g}: expected both above 0; {MADE_AGAIN}"
     if not (np.diff(path["breakpoints"], prepend=0.0) >= 0).all():
-        yield f"ambiguity.npz has breakpoints that do not increase from 0; {AGAIN}"
+        yield f"ambiguity.npz has breakpoints that do not increase from 0; {MADE_AGAIN}"

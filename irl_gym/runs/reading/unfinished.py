@@ -14,7 +14,7 @@ from irl_gym.errors import IrlGymError
 from irl_gym.features.linear_reward import load_reward
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, changed, checked_record, read_json, read_record
-from irl_gym.files.run_schema import Config, Environment
+from irl_gym.files.run_schema import Config, EnvironmentFile
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.mdp.episodes import empirical_policy
 from irl_gym.mdp.policies import load_actions
@@ -33,7 +33,7 @@ def left_behind(path: Path) -> Case | None:
         if any(changed(path, read_record(path, stage) or {}) for stage in (START, *FIRST)):
             return None
         config = read_json(path / "config.json", Config)
-        space = told_space("observations", read_json(path / ENVIRONMENT, Environment)["observations"])
+        space = told_space("observations", read_json(path / ENVIRONMENT, EnvironmentFile)["observations"])
         table = load_table(path / TABLE, space)
         record = read_record(path, "reward") or {}
         learned = load_reward(path / "reward.npz") if record else None

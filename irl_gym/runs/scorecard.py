@@ -43,7 +43,7 @@ def scorecard(
 
     Args:
         config: the run's.
-        records: of the stages in `RECORDS`.
+        records: of the stages in `TOLD_STAGES`.
         certificate: the content of certificate.json.
         policies: their rows, by `evaluation.evaluate`.
         scale: of scores, by the same.

@@ -1,6 +1,6 @@
-"""Many episodes in each layout of arrays, as `Rows`. Axes: N episodes, T steps, n rows.
+"""Many episodes in each layout of arrays, as `LogColumns`. Axes: N episodes, T steps, n rows.
 
-`columns` are what a log has, by the names of the fields of `Rows`: observations, actions, and perhaps rewards, terminated,
+`columns` are what a log has, by the names of the fields of `LogColumns`: observations, actions, and perhaps rewards, terminated,
 truncated, next_observations. Here the flags may also be one an episode, and observations one more than actions in each.
 """
 

@@ -112,4 +112,4 @@ SECTIONS: tuple[Callable[..., Section], ...] = (
     asked,
     reproduce,
 )
-"""In order: each is shown where what it needs is there (`Contents`, then the run's own fields)."""
+"""In order: each is shown where what it needs is there (`RunContents`, then the run's own fields)."""

@@ -1,7 +1,8 @@
 """Many episodes in each layout of arrays, as `LogColumns`. Axes: N episodes, T steps, n rows.
 
 `columns` are what a log has, by the names of the fields of `LogColumns`: observations, actions, and perhaps rewards,
-terminated, truncated, next_observations. Here the flags may also be one an episode, and observations one more than actions in each.
+terminated, truncated, next_observations. Here the flags may also be one an episode, and observations one more than actions in
+each.
 """
 
 from collections.abc import Mapping

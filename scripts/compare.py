@@ -16,9 +16,9 @@ from irl_gym import IrlGymError
 from irl_gym.commands.terminal import check_writable, exit_code, print_error
 from irl_gym.errors import InvalidParameter
 from irl_gym.facts import harmless
-from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
+from irl_gym.reports.comparison.compared_runs import lettered
+from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.comparison.pooled import told
-from irl_gym.runs.pooling import pools
 from irl_gym.runs.run import read_run
 
 
@@ -43,7 +43,7 @@ def main(arguments: Arguments) -> int:
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
-    together = [told(pool) for pool in pools(lettered(runs))]
+    together = [told(pool) for pool in lettered(runs).pools]
     together += [f"{run.path}: {run.caution}" for run in runs if run.caution is not None]
     console = Console(soft_wrap=True)
     for line in together:

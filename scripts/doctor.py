@@ -25,10 +25,11 @@ from irl_gym.commands.terminal import exit_code, print_error
 from irl_gym.errors import RunIncomplete
 from irl_gym.facts import harmless
 from irl_gym.judging.diagnoses.doctor import Diagnosis
-from irl_gym.judging.diagnoses.findings import told_answer
-from irl_gym.judging.diagnoses.plain_words import usable_flags, with_names
+from irl_gym.judging.diagnoses.findings import row_of, told_answer, told_finding
+from irl_gym.judging.diagnoses.plain_words import usable_flags
 from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
 from irl_gym.runs.run import Run, read_run
+from irl_gym.runs.supply import supplied
 
 CODES = {"healthy": 0, "findings": 1, "not examined": 3}
 """What the script exits with, by the doctor's answer."""
@@ -52,8 +53,7 @@ def show(diagnosis: Diagnosis, console: Console, run: Run | None) -> None:
     answer = harmless(told_answer(diagnosis.to_json()))
     console.print(Text.assemble((answer, style), f" {harmless(diagnosis.examined)}"))
     for number, one in enumerate(diagnosis.findings, start=1):
-        known = run is not None and run.table is not None
-        sentence = with_names(one.sentence, run.state_name, run.actions) if run is not None and known else one.sentence
+        sentence = told_finding(one.to_json(), row_of if run is None else run.place_name)
         console.print(Text.assemble((f"\n{number}. {one.name}", "bold"), f"\n   {harmless(sentence)}"))
         console.print(Text.assemble(("   Mend: ", "bold"), harmless(one.mend)))
         flags = usable_flags(one.flags, given=run is not None and run.config.get("dataset") is not None)
@@ -83,7 +83,7 @@ def main(arguments: Arguments) -> int:
     console, unfinished, run = Console(soft_wrap=True), None, None
     try:
         run = read_run(arguments.run)
-        diagnosis = diagnose_run(run)
+        diagnosis = supplied(diagnose_run, run)
     except (IrlGymError, OSError) as error:
         unfinished = error
         diagnosis = left(arguments.run) if isinstance(error, RunIncomplete) else None

@@ -6,6 +6,7 @@ from models import ring
 from irl_gym.features.feature_maps import Table
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses.doctor import doctor
+from irl_gym.judging.diagnoses.findings import WHERE
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.proofs.finite_proof import prove
 from irl_gym.learners.linear_programs.proofs.trajectory_proof import TrajectoryProof
@@ -32,7 +33,9 @@ def names(result, mdp, expert, **known):
 
 def finding(name, result, mdp, expert, **known):
     """The finding of this name."""
-    return next(one for one in doctor(result, mdp, expert, **known).findings if one.name == name)
+    found = next(one for one in doctor(result, mdp, expert, **known).findings if one.name == name)
+    assert (WHERE in found.sentence) <= bool(found.states.size)
+    return found
 
 
 def check_mends(name, says, ill, mended):

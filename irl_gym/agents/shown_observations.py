@@ -26,7 +26,7 @@ from minari.serialization import serialize_space
 from irl_gym.errors import DamagedFile, InvalidInput, InvalidParameter
 from irl_gym.files.archives import read_arrays
 from irl_gym.files.own_files import write_arrays
-from irl_gym.files.pickles import Call, as_numbers, read_pickle
+from irl_gym.files.pickles import PickledCall, as_numbers, read_pickle
 from irl_gym.spaces.integer_spaces import ranges
 from irl_gym.spaces.listed_states import ListedStates
 from irl_gym.spaces.space_json import told_space
@@ -202,7 +202,7 @@ def read_statistics(path: str | os.PathLike) -> Normaliser:
 
 
 def _of_pickle(root: Any) -> Normaliser:
-    if not isinstance(root, Call) or not isinstance(root.args, tuple) or not isinstance(root.state, dict):
+    if not isinstance(root, PickledCall) or not isinstance(root.args, tuple) or not isinstance(root.state, dict):
         raise ValueError("it is no VecNormalize")
     state = root.state
     if not state.get("norm_obs") or "obs_rms" not in state:

@@ -73,6 +73,11 @@ class Simulator:
                 f"{self.env.observation_space} and {self.n_actions}, the environment's. Is it another one's?"
             )
 
+    @property
+    def exact(self) -> bool:
+        """Is it solved exactly, on a table?"""
+        return isinstance(self.planner, ValueIteration)
+
     @cached_property
     def known(self) -> Tabulation | None:
         """The table, if there is one.
@@ -80,7 +85,7 @@ class Simulator:
         Raises:
             NotTabular, NotDiscrete: ValueIteration needs one, and none can be made.
         """
-        if self.table is not None or not isinstance(self.planner, ValueIteration):
+        if self.table is not None or not self.exact:
             return self.table
         try:
             return tabulate(self.env, gamma=self.gamma, check_steps=0)
@@ -104,7 +109,7 @@ class Simulator:
                 table.mdp, reward.tabular(table.states), num_envs=self.num_envs, max_episode_steps=self._limit,
                 states=table.states, show_rows=shows_rows(table.states), seed=seed,
             )  # fmt: skip
-            if not isinstance(self.planner, ValueIteration):
+            if not self.exact:
                 world = normalised(world, self.gamma)
         try:
             return self.planner.plan(world, gamma=self.gamma, seed=seed)

@@ -214,5 +214,7 @@ def parse_reveal(parts: Sequence[str]) -> Reveals:
                 f"reveal has {part!r}: expected name=number of values, such as step_count=100, or a list of them, such as "
                 "last=[None,0,1]; or known, or none."
             )
+        if name in found:
+            raise InvalidParameter(f"reveal has {part!r} after {name}={found[name]}: expected each name once. Leave one out.")
         found[name] = read
     return found

@@ -16,7 +16,7 @@ from irl_gym.checks import discrete_actions
 from irl_gym.errors import InvalidParameter
 from irl_gym.spaces.names import ACTIONS, of_class
 
-QUIT, AGAIN, HELP = "q", "r", "?"
+QUIT, RESTART, HELP = "q", "r", "?"
 NAMED = ("up", "down", "left", "right", "space", "enter", "escape")
 """Keys that are more than a character."""
 _SIGNS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
@@ -70,7 +70,7 @@ class Controls:
             said.append(f"actions by number ({' '.join(by_number)})")
         out_of_reach = len(self.names) - len(set(self.actions.values()))
         missing = f" {out_of_reach} of {len(self.names)} actions have no key." if out_of_reach else ""
-        return f"Keys: {', '.join(said)}; again ({AGAIN}), end ({QUIT}), keys ({HELP}).{missing}"
+        return f"Keys: {', '.join(said)}; again ({RESTART}), end ({QUIT}), keys ({HELP}).{missing}"
 
 
 def controls_of(env: gym.Env, overrides: str = "") -> Controls:
@@ -101,8 +101,10 @@ def _parsed(overrides: str, n: int) -> dict[str, int]:
                 f"keys has {part!r}: expected key=action, where a key is one character or one of {', '.join(NAMED)}. For "
                 'example "w=3,a=0,space=2".'
             )
-        if key.lower() in (QUIT, AGAIN, HELP):
-            raise InvalidParameter(f"keys has {part!r}: {QUIT}, {AGAIN} and {HELP} end, begin again and help. Use another key.")
+        if key.lower() in (QUIT, RESTART, HELP):
+            raise InvalidParameter(
+                f"keys has {part!r}: {QUIT}, {RESTART} and {HELP} end, begin again and help. Use another key."
+            )
         if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) < n):
             raise InvalidParameter(f"keys has {part!r}: expected an action from 0 to {n - 1}, counted from 0.")
         if asked.setdefault(key, int(text)) != int(text):

@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array
 
 from irl_gym.checks import checked_number
-from irl_gym.commands.keyboard import AGAIN, HELP, QUIT, Controls, controls_of, described
+from irl_gym.commands.keyboard import HELP, QUIT, RESTART, Controls, controls_of, described
 from irl_gym.demonstrations.datasets import described as description_of
 from irl_gym.demonstrations.datasets import writable_root, write_minari
 from irl_gym.demonstrations.minari_files import check_free, check_id, unkept
@@ -45,7 +45,7 @@ class Turn:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class KeyStep:
     """What a key did."""
 
     action: int
@@ -84,7 +84,7 @@ class Play:
         self.over = False
         self._wanted, self._keep, self._seed = n_episodes, keep_unfinished, seed - 1
         self._beginning: Any = None
-        self._steps: list[Step] = []
+        self._steps: list[KeyStep] = []
 
     def start(self) -> Turn:
         """Begin the first episode."""
@@ -98,7 +98,7 @@ class Play:
             return [Turn(None, self.stop())]
         if key == HELP:
             return [Turn(None, str(self.controls))]
-        if key.lower() == AGAIN:
+        if key.lower() == RESTART:
             return [self._begin(f"{_steps(len(self._steps))} discarded. ")]
         action = self.controls.action(key)
         if action is None:
@@ -117,7 +117,7 @@ class Play:
             return ""
         if not self._keep:
             return f"The unfinished episode of {_steps(len(steps))} is discarded."
-        steps[-1] = Step(last.action, last.reward, last.observation, False, True)
+        steps[-1] = KeyStep(last.action, last.reward, last.observation, False, True)
         self._put_down(self._episode(steps))
         return f"The unfinished episode of {_steps(len(steps))} is kept, as truncated."
 
@@ -133,7 +133,7 @@ class Play:
     def _step(self, action: int) -> list[Turn]:
         first_action = int(getattr(self.env.action_space, "start", 0))
         observation, reward, terminated, truncated, _ = self.env.step(action + first_action)
-        step = Step(action, float(reward), copy.deepcopy(observation), bool(terminated), bool(truncated))
+        step = KeyStep(action, float(reward), copy.deepcopy(observation), bool(terminated), bool(truncated))
         self._steps.append(step)  # all of a step at once: an interruption finds whole ones
         total = sum(one.reward for one in self._steps)
         name = self.controls.names[action]
@@ -150,7 +150,7 @@ class Play:
         self.over = len(self.episodes) >= self._wanted
         return [Turn(turn.frame, ended)] + ([] if self.over else [self._begin("")])
 
-    def _episode(self, steps: list[Step]) -> Episode:
+    def _episode(self, steps: list[KeyStep]) -> Episode:
         space, seen = self.env.observation_space, [self._beginning, *(step.observation for step in steps)]
         return Episode(
             concatenate(space, seen, create_empty_array(space, n=len(seen))),

@@ -46,7 +46,7 @@ def recorded_environment(dataset: minari.MinariDataset, *, trust: bool = False) 
 
     Raises:
         DatasetMismatch: the dataset does not say, or what it says cannot be made here.
-        UnknownEnvironment: an environment that is not registered here.
+        UnknownEnvironment: an environment that is not registered here, or a wrapper that another version of irl_gym had.
         NotTrusted: arguments that are not plain, or wrappers that are not known.
     """
     name, spec = dataset.spec.dataset_id, dataset.env_spec
@@ -105,6 +105,11 @@ def _wrapper(name: str, spec: EnvSpec, asked: WrapperSpec, here: EnvSpec) -> Wra
         return WrapperSpec(kind, f"{module}:{kind}", asked.kwargs)
     if plain and f"{module}.".startswith("gymnasium.wrappers.") and kind in OF_GYMNASIUM:
         return WrapperSpec(kind, f"gymnasium.wrappers:{kind}", asked.kwargs)
+    if module.startswith("irl_gym.") and kind in (known := {one.partition(":")[2]: one for one in OF_IRL_GYM}):
+        raise UnknownEnvironment(
+            f"dataset {name!r} was recorded in {_shown(spec.id)} with the wrapper {_shown(asked.entry_point)}, of another "
+            f"version of irl_gym: expected {known[kind]}, as it is called here. Name an environment with --env-id."
+        )
     _refuse(NotTrusted, name, spec, f"with the wrapper {_shown(asked.entry_point)}", "Record it without that wrapper")
 
 

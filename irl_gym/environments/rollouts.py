@@ -27,7 +27,7 @@ APART = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class BatchMoment:
     """What the episodes that still go on see at one time, and the step that led there."""
 
     time: int
@@ -48,7 +48,7 @@ class Moment:
 
 def moments_of(
     env: gym.Env, policy: Policy, n: int, *, seed: int = 0, most: int | None = None, deterministic: bool = True
-) -> Iterator[Moment]:
+) -> Iterator[BatchMoment]:
     """Run a policy for n episodes, many at once, and yield what they see, time by time, batch by batch.
 
     Args:
@@ -72,7 +72,7 @@ def moments_of(
     return _batches(env, policy, int(n), int(seed), most, deterministic)  # NumPy's integers do not seed Gymnasium
 
 
-def _batches(env: gym.Env, policy: Policy, n: int, seed: int, most: int | None, deterministic: bool) -> Iterator[Moment]:
+def _batches(env: gym.Env, policy: Policy, n: int, seed: int, most: int | None, deterministic: bool) -> Iterator[BatchMoment]:
     copies = min(n, TOGETHER if _vectorised(env) else APART)
     vector = _vector(env, copies)
     try:
@@ -84,12 +84,12 @@ def _batches(env: gym.Env, policy: Policy, n: int, seed: int, most: int | None, 
 
 def _batch(
     vector: VectorEnv, policy: Policy, numbers: np.ndarray, seed: int, most: int | None, deterministic: bool
-) -> Iterator[Moment]:
+) -> Iterator[BatchMoment]:
     first = int(getattr(vector.single_action_space, "start", 0))
     observations, _ = vector.reset(seed=seed)
     going = np.arange(numbers.size)
     nothing, no = np.zeros(0), np.zeros(numbers.size, dtype=bool)
-    yield Moment(0, numbers, take(observations, going), nothing, nothing, no, no)
+    yield BatchMoment(0, numbers, take(observations, going), nothing, nothing, no, no)
     elapsed = 0
     while going.size:
         chosen, _ = policy.predict(observations, deterministic=deterministic)
@@ -98,7 +98,7 @@ def _batch(
         elapsed += 1
         cut = (truncated | (elapsed == most)) & ~terminated
         here = take(observations, going)
-        yield Moment(
+        yield BatchMoment(
             elapsed, numbers[going], here, actions[going], np.asarray(rewards, float)[going], terminated[going], cut[going]
         )
         going = going[~(terminated | cut)[going]]
@@ -140,7 +140,7 @@ def run_episodes(
     Their `seed` is None: episodes of one batch share its generator.
     """
     moments = moments_of(env, policy, n, seed=seed, most=most, deterministic=deterministic)
-    found: list[list[Moment]] = [[] for _ in range(n)]
+    found: list[list[BatchMoment]] = [[] for _ in range(n)]
     places: list[list[int]] = [[] for _ in range(n)]
     for moment in moments:
         for place, number in enumerate(moment.who.tolist()):
@@ -149,7 +149,7 @@ def run_episodes(
     return [_episode(moments, where) for moments, where in zip(found, places, strict=True)]
 
 
-def _episode(moments: list[Moment], places: list[int]) -> Episode:
+def _episode(moments: list[BatchMoment], places: list[int]) -> Episode:
     steps = list(zip(moments, places, strict=True))
     last, place = steps[-1]
     return Episode(

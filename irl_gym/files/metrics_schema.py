@@ -32,7 +32,7 @@ def _gaps(told: Any) -> Any:
     return told
 
 
-class Proof(TypedDict, total=False):
+class RewardEntries(TypedDict, total=False):
     """What is known of a reward, whichever learner it is of."""
 
     zero: bool
@@ -65,7 +65,7 @@ class Proof(TypedDict, total=False):
     trivial: Count
 
 
-class _Part(Proof, total=False):
+class _Part(RewardEntries, total=False):
     expert_optimal: bool | None
     degenerate: bool
     states: Count
@@ -82,17 +82,17 @@ class _Part(Proof, total=False):
     violated: list[Count]
 
 
-Part = Annotated[_Part, AfterValidator(_together), AfterValidator(_gaps)]
+CertificatePart = Annotated[_Part, AfterValidator(_together), AfterValidator(_gaps)]
 
 
 class Certificate(TypedDict):
     """certificate.json, of `certificates.certificate_of`, but for its facts, which `facts.facts_of` reads."""
 
-    optimality: Part | None
-    proof: Part
+    optimality: CertificatePart | None
+    proof: CertificatePart
 
 
-class _Rewarded(Proof):
+class _Rewarded(RewardEntries):
     learner: Text
     status: StatusName
     expert_optimal: NotRequired[bool | None]
@@ -150,7 +150,7 @@ class Worth(TypedDict):
     high: Number | None
 
 
-class Check(TypedDict):
+class CheckEntry(TypedDict):
     """How a table was checked, of `SelfCheck`."""
 
     steps: Count
@@ -168,7 +168,7 @@ class Sized(TypedDict):
     exact: bool
     method: Text
     checked: Text | None
-    check: Check | None
+    check: CheckEntry | None
     horizon: NotRequired[Count | None]
     split: NotRequired[Count]
     counted: NotRequired[bool]
@@ -187,7 +187,7 @@ class Demonstrated(Lost):
     vecnormalize: NotRequired[bool]
 
 
-Training = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Count | None, "steps_to_0.99": Count | None})
+TrainingEntry = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Count | None, "steps_to_0.99": Count | None})
 
 
 class Metrics(TypedDict):
@@ -195,7 +195,7 @@ class Metrics(TypedDict):
 
     policies: Annotated[dict[str, Row], AfterValidator(_with_references)]
     reward: Annotated[_Rewarded, AfterValidator(_together)]
-    training: Training
+    training: TrainingEntry
     table: Sized | None
     demonstrations: Demonstrated
     score_reason: NotRequired[Text | None]

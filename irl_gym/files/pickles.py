@@ -16,7 +16,7 @@ MOST_BYTES = 8 << 20
 
 
 @dataclass(frozen=True)
-class Name:
+class PickledName:
     """What would have been imported."""
 
     module: str
@@ -26,7 +26,7 @@ class Name:
 
 
 @dataclass(eq=False)
-class Call:
+class PickledCall:
     """What would have been called, and put into what came of it."""
 
     maker: Any
@@ -40,7 +40,7 @@ class Call:
 
     def is_of(self, name: str, *modules: str) -> bool:
         """Does it call this name of one of these modules?"""
-        return isinstance(self.maker, Name) and self.maker.name == name and self.maker.module in modules
+        return isinstance(self.maker, PickledName) and self.maker.name == name and self.maker.module in modules
 
 
 _VALUES = {
@@ -52,7 +52,7 @@ _VALUES = {
 _MULTIARRAY = ("numpy.core.multiarray", "numpy._core.multiarray")
 _NUMERIC = ("numpy.core.numeric", "numpy._core.numeric")
 _KINDS = "biuf"
-_KEYS = (str, bytes, int, float, Name, type(None))
+_KEYS = (str, bytes, int, float, PickledName, type(None))
 """Of dictionaries; a tuple of these, too."""
 
 
@@ -130,24 +130,24 @@ class _Machine:
         if pairs and isinstance(target, dict):
             target.update(_dictionary(found))
         else:
-            (target.items if isinstance(target, Call) else target).extend(found)
+            (target.items if isinstance(target, PickledCall) else target).extend(found)
 
     def _call(self, name: str, argument: Any) -> None:
         stack = self.stack
         if name == "GLOBAL":
             module, _, what = str(argument).partition(" ")
-            stack.append(Name(module, what))
+            stack.append(PickledName(module, what))
         elif name == "STACK_GLOBAL":
             module, what = stack.pop(-2), stack.pop()
             if not isinstance(module, str) or not isinstance(what, str):
                 raise ValueError("it has a name that is no text")
-            stack.append(Name(module, what))
+            stack.append(PickledName(module, what))
         elif name in ("REDUCE", "NEWOBJ"):
             args, maker = stack.pop(), stack.pop()
-            stack.append(Call(maker, args))
+            stack.append(PickledCall(maker, args))
         elif name == "BUILD":
             state = stack.pop()
-            if not isinstance(stack[-1], Call):
+            if not isinstance(stack[-1], PickledCall):
                 raise ValueError("it gives a state to what has none")
             stack[-1].state = state
         else:
@@ -171,13 +171,13 @@ def as_numbers(found: Any) -> np.ndarray:
     try:
         if isinstance(found, bool | int | float):
             return np.asarray(found, dtype=np.float64)
-        if isinstance(found, Call) and found.is_of("_reconstruct", *_MULTIARRAY):
+        if isinstance(found, PickledCall) and found.is_of("_reconstruct", *_MULTIARRAY):
             _, shape, dtype, fortran, raw = found.state
             return _array(raw, dtype, shape, "F" if fortran else "C")
-        if isinstance(found, Call) and found.is_of("_frombuffer", *_NUMERIC):
+        if isinstance(found, PickledCall) and found.is_of("_frombuffer", *_NUMERIC):
             raw, dtype, shape, order = found.args
             return _array(raw, dtype, shape, order)
-        if isinstance(found, Call) and found.is_of("scalar", *_MULTIARRAY):
+        if isinstance(found, PickledCall) and found.is_of("scalar", *_MULTIARRAY):
             dtype, raw = found.args
             return _array(raw, dtype, (), "C")
     except (TypeError, OverflowError, LookupError) as error:
@@ -187,7 +187,7 @@ def as_numbers(found: Any) -> np.ndarray:
 
 def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
     """An array of its bytes."""
-    if not isinstance(dtype, Call) or not dtype.is_of("dtype", "numpy") or not isinstance(raw, bytes | bytearray):
+    if not isinstance(dtype, PickledCall) or not dtype.is_of("dtype", "numpy") or not isinstance(raw, bytes | bytearray):
         raise ValueError("it has an array without numbers")
     kind, byteorder = dtype.args[0], (dtype.state or (3, "="))[1]
     if not isinstance(kind, str) or not isinstance(byteorder, str):

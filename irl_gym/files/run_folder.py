@@ -25,7 +25,7 @@ from irl_gym.files.run_schema import RECORDS_OF, Stage, checked
 NOT_THE_SAME = "is not the file that the run left, by its sha256: it was changed, damaged, or copied from another run"
 DEEPEST = 100
 """Objects and lists inside each other."""
-RECORDS = ".stages"
+STAGE_RECORDS = ".stages"
 """Where the records of finished stages are, in the folder of a run."""
 
 LOGS = "tensorboard"
@@ -110,7 +110,7 @@ def checked_record(folder: Path, stage: str) -> dict[str, Any]:
         OSError: it cannot be read now, or there is none.
         DamagedFile: it is no record of files in the folder.
     """
-    record = read_json(folder / RECORDS / f"{stage}.json", RECORDS_OF.get(stage, Stage))
+    record = read_json(folder / STAGE_RECORDS / f"{stage}.json", RECORDS_OF.get(stage, Stage))
     for name in (*record["files"], *record.get("sha256", {})):
         if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
             raise DamagedFile(f"it is of {name!r:.80}: expected a file in the folder")
@@ -119,8 +119,8 @@ def checked_record(folder: Path, stage: str) -> dict[str, Any]:
 
 def write_record(folder: Path, stage: str, record: Mapping[str, Any]) -> None:
     """Write the record of a stage, which is finished with it."""
-    (folder / RECORDS).mkdir(exist_ok=True)
-    write_json(folder / RECORDS / f"{stage}.json", record)
+    (folder / STAGE_RECORDS).mkdir(exist_ok=True)
+    write_json(folder / STAGE_RECORDS / f"{stage}.json", record)
 
 
 def changed(folder: Path, record: Mapping[str, Any]) -> str | None:
@@ -163,7 +163,7 @@ class RunFolder:
             ) from error
         now = dict(_leaves(wanted))
         different = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
-        finished = [one for one in (self.path / RECORDS).glob("*.json") if one.stem != START]
+        finished = [one for one in (self.path / STAGE_RECORDS).glob("*.json") if one.stem != START]
         if before and different and not finished:  # nothing is lost
             write_json(known, wanted)
             return

@@ -76,7 +76,7 @@ Pair = Annotated[list[Count], Field(min_length=2, max_length=2)]
 # --- what was asked, who wrote it, where it took place ---
 
 
-class Learner(TypedDict):
+class LearnerEntry(TypedDict):
     """A learner by its class's name; the other fields are its own."""
 
     type: Text
@@ -89,7 +89,7 @@ class Config(TypedDict):
     gamma: Share
     seed: int
     env_kwargs: dict[str, Any]
-    learner: Learner
+    learner: LearnerEntry
     env_id: NotRequired[Text | None]
     dataset: NotRequired[Text | None]
     epsilon: NotRequired[Share]
@@ -103,7 +103,7 @@ class Version(TypedDict):
     command: list[Text] | None
 
 
-class Environment(TypedDict):
+class EnvironmentFile(TypedDict):
     """environment.json, of `claims.write_environment`."""
 
     id: Text | None
@@ -150,7 +150,7 @@ class Lost(TypedDict, total=False):
     episodes_cut: Count
 
 
-class Shown(Stage, Lost):
+class ShownRecord(Stage, Lost):
     """Of the demonstrations."""
 
     dataset_id: Text
@@ -158,7 +158,7 @@ class Shown(Stage, Lost):
     no_environment: NotRequired[Text]
 
 
-class Program(TypedDict):
+class ProgramEntry(TypedDict):
     """What is noted of one program, of `solvers.Answer`."""
 
     status: StatusName
@@ -170,11 +170,11 @@ class Program(TypedDict):
 class Stats(TypedDict, total=False):
     """What is noted of all of them."""
 
-    programs: dict[str, Program]
+    programs: dict[str, ProgramEntry]
     rounds: list[Any]
     best_round: Count
     best_by: Text
-    inner: Text
+    exact_planner: bool
     expert_episodes: Count
     episodes_dropped: Count
 
@@ -211,7 +211,7 @@ class Open(Stage):
 
 
 RECORDS_OF: Mapping[str, Any] = {
-    "start": Start, "expert": Planned, "demonstrations": Shown, "reward": Learned, "agent": Retrained, "ambiguity": Open,
+    "start": Start, "expert": Planned, "demonstrations": ShownRecord, "reward": Learned, "agent": Retrained, "ambiguity": Open,
 }  # fmt: skip
 """The shape of a record by its stage's name; of any other stage it is that of `Stage`."""
 
@@ -226,9 +226,14 @@ def _answered(told: Any) -> Any:
     return told
 
 
-class Found(TypedDict):
-    """A finding of the doctor."""
+def _placed(told: Any) -> Any:
+    """Refuse a finding whose actions are not those of its states."""
+    if len(told["actions"]) not in (0, len(told["states"])):
+        raise ValueError("an action for each of its states, or none")
+    return told
 
+
+class _Found(TypedDict):
     name: Text
     sentence: Text
     mend: Text
@@ -237,11 +242,15 @@ class Found(TypedDict):
     flags: list[Flag]
 
 
+FindingEntry = Annotated[_Found, AfterValidator(_placed)]
+"""A finding of the doctor."""
+
+
 class _Diagnosed(TypedDict):
     answer: Literal["healthy", "findings", "not examined"]
     why: Text | None
     examined: Text
-    findings: list[Found]
+    findings: list[FindingEntry]
 
 
 Diagnosed = Annotated[_Diagnosed, AfterValidator(_answered)]
@@ -258,7 +267,7 @@ class Grid(TypedDict):
     letters: list[list[Annotated[str, Field(max_length=1)]]]
 
 
-class Moment(TypedDict):
+class MomentEntry(TypedDict):
     """A time of a film; nothing else is told of it."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
@@ -273,7 +282,7 @@ class Moment(TypedDict):
     frame: Count | None
 
 
-class Film(TypedDict):
+class FilmFile(TypedDict):
     """films/*.json, of `Film.save`."""
 
     format: Literal["irl_gym.Film/1"]
@@ -283,4 +292,4 @@ class Film(TypedDict):
     kind: Literal["webp", "png"]
     frames: Count
     without_frames: Text | None
-    steps: list[Moment]
+    steps: list[MomentEntry]

@@ -32,7 +32,7 @@ JUDGING = 1_000_003
 
 
 @runtime_checkable
-class World(Protocol):
+class JudgingWorld(Protocol):
     """Where policies are judged."""
 
     @property
@@ -65,7 +65,7 @@ class Candidate:
     """Fresh ones of the environment; none of a policy that is known by episodes that were given, or of a run that is read."""
 
 
-def played(policy: Any, how: str, world: World, table: Tabulation | None, *, episodes: int, seed: int) -> Candidate:
+def played(policy: Any, how: str, world: JudgingWorld, table: Tabulation | None, *, episodes: int, seed: int) -> Candidate:
     """A policy that can act.
 
     Args:
@@ -96,7 +96,7 @@ def seen(episodes: Sequence[Episode], how: str, table: Tabulation | None, gamma:
 
 
 def evaluate(
-    policies: Mapping[str, tuple[Any, str]], world: World, table: Tabulation | None, horizon: int | None, *,
+    policies: Mapping[str, tuple[Any, str]], world: JudgingWorld, table: Tabulation | None, horizon: int | None, *,
     given: Sequence[Episode] | None, episodes_only: bool, episodes: int, seed: int,
 ) -> tuple[dict[str, dict[str, Any]], Scale]:  # fmt: skip
     """Judge policies: their rows of metrics.json, and the scale of their scores.

@@ -17,10 +17,11 @@ they differ by is not known to a quarter (`scores.BLUR`). If the score is that o
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from irl_gym.facts import Mood
 from irl_gym.intervals import Interval, as_interval
 from irl_gym.judging.metrics import normalised_score
 from irl_gym.judging.scores import BLUR, EXPERT, RANDOM, agent_of, called, others, score_of
@@ -30,7 +31,6 @@ GOOD = 0.9
 MUCH = 0.05
 """A share that is much to lose."""
 
-Mood = Literal["good", "open", "bad", "plain"]
 WORDS: Mapping[Mood, str] = {"good": "good", "open": "left open", "bad": "not good", "plain": "not judged"}
 """What each is called; plain is where nothing is judged."""
 

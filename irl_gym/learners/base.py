@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -100,6 +100,18 @@ class Learner(Protocol):
             MissingPart: the problem lacks a part that is needed.
         """
         ...
+
+
+def checked_learner(learner: Any) -> Any:
+    """A learner as it is.
+
+    Raises:
+        InvalidParameter: it is none, or the class of one, or no record whose fields a run can keep.
+    """
+    if not is_dataclass(learner) or isinstance(learner, type) or not isinstance(learner, Learner):
+        what = "a frozen dataclass with `needs` and `learn`, such as FiniteLP()"
+        raise InvalidParameter(f"learner is {learner!r:.80}: expected {what}.")
+    return learner
 
 
 def featured(learner: AnyLearner, problem: Problem) -> AnyLearner:

@@ -13,7 +13,7 @@ import numpy as np
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.metrics import optimal_actions
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import Episode, seen_parts
 from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
 from irl_gym.mdp.policies import as_distribution
@@ -36,7 +36,7 @@ def learning_curve(folder: Path, curve: Curve, judged: Mapping[str, Any]) -> dic
     if not curve.steps.size:
         return {}
     levels = {name: judged["policies"][name]["value"] for name in ("expert", "random")}
-    drawn = {"retrained on the recovered reward": plotting.Curve(curve.steps, curve.value)}
+    drawn = {"retrained on the recovered reward": plotting.DrawnCurve(curve.steps, curve.value)}
     return _kept(folder, {"learning_curve.png": plotting.draw_learning_curve(drawn, **levels)})
 
 
@@ -101,7 +101,7 @@ def _of_plane(
 
 
 def returns(
-    folder: Path, weights: LinearReward, demonstrations: list[Episode], agent: Any, world: World, seed: int
+    folder: Path, weights: LinearReward, demonstrations: list[Episode], agent: Any, world: RunWorld, seed: int
 ) -> dict[str, Any]:
     """The recovered reward's return of episodes against the true one's, where there is no table."""
     seed += 31_337

@@ -6,7 +6,6 @@ report      report.html, from what is on disk alone
 Parts are those of `irl_gym.loop.loop.Loop.sources`.
 """
 
-import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -21,11 +20,11 @@ from irl_gym.files.run_folder import write_json
 from irl_gym.judging.ambiguity.lambda_path import lambda_path
 from irl_gym.judging.ambiguity.widths import feasible_widths
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose, weights_of
+from irl_gym.judging.diagnoses.doctor import Diagnosis, diagnose
 from irl_gym.judging.diagnoses.findings import NO_REWARD
 from irl_gym.learners.base import Learner
 from irl_gym.loop.filming import film
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import Episode, seen_parts
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -45,7 +44,7 @@ MOST_STEPS = 2_500
 
 
 def films(
-    folder: Path, world: World, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
+    folder: Path, world: RunWorld, env: gym.Env, env_id: str | None, given: list[Episode] | None, demonstrations: list[Episode],
     expert: Any, agent: Any, learned_policy: Any, learned: TabularReward | LinearReward | None, seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """An episode of the expert, the first of a dataset where one was given, and one of the agent, which without a reward is the
@@ -81,10 +80,9 @@ def diagnosis(
     shaping: bool, judged: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     """What the doctor says. An examination that fails does not undo the run: the diagnosis says why."""
-    status = Status(solved["status"])
-    case = Case(
-        mdp, known_expert, tabular, claims_in(certificate), status, solved["stats"], true, shaping, judged, weights_of(learned)
-    )
+    status, weights = Status(solved["status"]), None if learned is None else learned.alpha
+    claims = claims_in(certificate)
+    case = Case(mdp, known_expert, tabular, claims, status, solved["stats"], true, shaping, judged, weights)
     try:
         found = NO_REWARD if learned is None else diagnose(case)
     except IrlGymError as error:
@@ -143,8 +141,9 @@ def _path(learner: Any, mdp: TabularMDP, expert: Any, *, margin_cap: float | Non
         most_pieces=MOST_PIECES,
     )
     arrays = {name: getattr(found, name) for name in ("breakpoints", "rewards", "margins", "l1_norms", "total_margins")}
-    arrays |= {"gap": np.array(found.gap), "exact": np.array(found.exact)}
-    return arrays | {"changes": np.array(json.dumps([change.to_json() for change in found.changes]))}
+    cap = np.nan if found.margin_cap is None else found.margin_cap
+    numbers = {"gap": found.gap, "r_max": found.r_max, "margin_cap": cap}
+    return arrays | {name: np.array(one, dtype=float) for name, one in numbers.items()} | {"exact": np.array(found.exact)}
 
 
 def report(folder: Path, path: Path, table: Tabulation | None) -> dict[str, Any]:

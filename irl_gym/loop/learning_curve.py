@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from irl_gym.judging.curves import Curve, curve_of
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.policies import Policy
 
 
@@ -21,7 +21,7 @@ class Glances:
         told: called with the steps and the policy too.
     """
 
-    def __init__(self, world: World, told: Callable[[int, Policy], None]):
+    def __init__(self, world: RunWorld, told: Callable[[int, Policy], None]):
         self.world, self.told = world, told
         self._updates: int | None = None
         self._steps: list[int] = []

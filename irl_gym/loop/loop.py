@@ -36,14 +36,14 @@ from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.loop import figures, final_stages, stages
 from irl_gym.loop.stages import REWARD, OnProgress
 from irl_gym.loop.world_choice import place_of
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.experiment import Experiment, as_config
 from irl_gym.runs.identity import STAGES, claim, record_start, write_environment, write_version
 from irl_gym.runs.named_parts import environment_of
-from irl_gym.runs.scorecard import RECORDS
+from irl_gym.runs.scorecard import TOLD_STAGES
 from irl_gym.runs.supply import missing, supplied
 from irl_gym.tables.table_files import TABLE
 
@@ -94,7 +94,7 @@ class Loop:
     """What to do."""
     env: gym.Env
     """The environment."""
-    world: World
+    world: RunWorld
     """Where it is: with a table, or stepped."""
     folder: RunFolder
     """The folder of the run."""
@@ -270,7 +270,7 @@ class Loop:
     @property
     def records(self) -> Mapping[str, Mapping[str, Any]]:
         """What was recorded of the stages that metrics.json tells of."""
-        return {name: self.stage(name) for name in RECORDS}
+        return {name: self.stage(name) for name in TOLD_STAGES}
 
     @cached_property
     def judged(self) -> Mapping[str, Any]:

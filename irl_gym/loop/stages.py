@@ -14,7 +14,6 @@ import numpy as np
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
-from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import AfterEnd, left_out
@@ -30,7 +29,7 @@ from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner, Outcome
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
-from irl_gym.loop.worlds import World
+from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
@@ -46,7 +45,9 @@ OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
 
 
-def planned_expert(folder: Path, teacher: Planner, world: World, epsilon: float, report_progress: OnProgress) -> dict[str, Any]:
+def planned_expert(
+    folder: Path, teacher: Planner, world: RunWorld, epsilon: float, report_progress: OnProgress
+) -> dict[str, Any]:
     """An expert that plans, or learns, under the true reward."""
     policy = world.train(logged(teacher, folder / LOGS / "expert"), None, _share(report_progress, "expert", teacher))
     world.keep(policy, folder, "expert", epsilon)
@@ -73,7 +74,7 @@ def recorded_episodes(
 
 
 def played_episodes(
-    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: World, expert: Any, gamma: float, episodes: int,
+    folder: Path, teacher: Planner, env: gym.Env, env_id: str, world: RunWorld, expert: Any, gamma: float, episodes: int,
     eval_episodes: int, seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """Episodes of an expert that was planned, as a Minari dataset."""
@@ -100,14 +101,14 @@ def played_episodes(
 
 
 def learned_outcome(
-    folder: Path, learner: Learner, problem: Problem, world: World, seed: int, table: Tabulation | None, known_expert: Any,
+    folder: Path, learner: Learner, problem: Problem, world: RunWorld, seed: int, table: Tabulation | None, known_expert: Any,
     from_episodes: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The reward or the policy that a learner finds, or both, and what it proves."""
     outcome: Any = learner.learn(problem, np.random.default_rng(seed))
     if not isinstance(outcome, Outcome):
         raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(outcome).__name__}: expected an Outcome.")
-    if table is None and isinstance(outcome.reward, TabularReward):
+    if table is None and outcome.reward is not None and outcome.reward.alpha is None:
         raise InvalidReward("the reward is of rows of a table, and there is none: expected a LinearReward of observations.")
     if outcome.reward is not None:
         outcome.reward.save(folder / REWARD)
@@ -118,8 +119,8 @@ def learned_outcome(
     record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
     _check_kept(learner, certificate, record)
     write_json(folder / "certificate.json", certificate)
-    if isinstance(problem.environment, Simulator):
-        record["stats"]["inner"] = type(problem.environment.planner).__name__
+    if problem.environment is not None:
+        record["stats"]["exact_planner"] = bool(getattr(problem.environment, "exact", False))
     return record
 
 
@@ -140,7 +141,7 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
 
 
 def retrained_agent(
-    folder: Path, retrainer: Planner, world: World, learned: TabularReward | LinearReward, shaping: bool,
+    folder: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
     certificate: Mapping[str, Any], report_progress: OnProgress,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
@@ -157,7 +158,7 @@ def retrained_agent(
 
 
 def metrics(
-    folder: Path, world: World, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
+    folder: Path, world: RunWorld, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
     demonstrations: list[Episode], from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None,
     horizon: int | None, tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
     certificate: Mapping[str, Any], curve: Curve,

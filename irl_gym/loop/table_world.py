@@ -112,7 +112,7 @@ class TableWorld:
 
     def tabular(self, reward: TabularReward | LinearReward) -> TabularReward:
         """A reward of either kind in the table."""
-        return reward.tabular(self.table.states) if isinstance(reward, LinearReward) else reward
+        return reward.tabular(self.table.states)
 
     def weights(self, reward: TabularReward | LinearReward) -> None:
         """What a reward of features is known by; here it is one of rows."""

@@ -18,7 +18,7 @@ from irl_gym.errors import (
     NotTabular,
 )
 from irl_gym.loop.table_world import TableWorld, step_limit
-from irl_gym.loop.worlds import SteppedWorld, World
+from irl_gym.loop.worlds import RunWorld, SteppedWorld
 from irl_gym.runs.experiment import Experiment
 from irl_gym.tables.discretize import discretize
 from irl_gym.tables.enumeration.table import Enumeration
@@ -33,7 +33,7 @@ ON_COMMAND_LINE: dict[type[Exception], str] = {
 """How the mends of errors are asked for there."""
 
 
-def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> World:
+def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> RunWorld:
     """The world of an experiment.
 
     Args:

@@ -95,7 +95,7 @@ class SteppedWorld:
 
     def weights(self, reward: TabularReward | LinearReward) -> LinearReward | None:
         """A reward of observations: all that is known of it."""
-        return reward if isinstance(reward, LinearReward) else None
+        return None if reward.alpha is None else reward
 
     def paid(self, reward: Any, *, shaped: bool, margin_cap: float | None) -> Any:
         """What an agent is paid: the reward as it is."""
@@ -169,7 +169,7 @@ class SteppedWorld:
         return glanced, None
 
 
-World = TableWorld | SteppedWorld
+RunWorld = TableWorld | SteppedWorld
 """Where a run takes place."""
 
 

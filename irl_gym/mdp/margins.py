@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from irl_gym._typing import Matrix, Vector
-from irl_gym.mdp.optimality_rows import Comparisons
+from irl_gym.mdp.optimality_rows import Comparisons, as_compared
 from irl_gym.mdp.planning.discounted import Discounted
+from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.planning.howard import Optimum
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -68,6 +69,59 @@ class Margins:
     def hold(self, equal: np.ndarray) -> np.ndarray:
         """(n,) rows that hold for certain."""
         return np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedRows:
+    """The rows of (4), with what they are worth under R."""
+
+    states: np.ndarray
+    """(n,) rows of the table."""
+    actions: np.ndarray
+    """(n,) the action that the expert's is compared with."""
+    equal: np.ndarray
+    """(n,) the expert takes this action too."""
+    trivial: np.ndarray
+    """(n,) both actions have the same successors."""
+    found: Margins
+    """Q(s, pi) - Q(s, a) of each row; NaN without a reward."""
+    either: np.ndarray
+    """(n,) rows that are violated to either side: equal ones, of an expert that is taken at its word."""
+    usable: np.ndarray
+    """(n,) rows that a reward of this kind can give a margin."""
+    errors: np.ndarray
+    """(n,) sampling errors of the margins; 0 on an exact table."""
+
+    @property
+    def margins(self) -> np.ndarray:
+        """(n,) what they are worth."""
+        return self.found.values
+
+    @property
+    def none(self) -> np.ndarray:
+        """(n,) a margin or a violation up to this is none."""
+        return self.found.none
+
+    @property
+    def violations(self) -> np.ndarray:
+        """(n,) by how much each row of (4) is violated."""
+        return self.found.violations(self.either)
+
+    @property
+    def violated(self) -> np.ndarray:
+        """(n,) rows that are violated for certain."""
+        return self.found.violated(self.either)
+
+    @property
+    def tied(self) -> np.ndarray:
+        """(n,) rows whose margin is none, and no violation."""
+        return np.abs(self.margins) <= self.none
+
+
+def margins_under(mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, *, best: bool) -> tuple[Optimum, Margins]:
+    """What acting best is worth under a reward, and the margins of (4): where everybody acts best afterwards, or the expert."""
+    found = optimum(as_compared(mdp, comparisons, reward.on_states), reward)
+    return found, best_margins(found, comparisons) if best else margins_of(found, comparisons)
 
 
 def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None = None) -> Margins:

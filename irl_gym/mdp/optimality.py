@@ -20,9 +20,8 @@ from irl_gym.checks import any_array
 from irl_gym.errors import InvalidParameter
 from irl_gym.facts import Fact, aligned, counted, plain
 from irl_gym.mdp.loss import AT_STAKE, loss_on, told_loss
-from irl_gym.mdp.margins import Margins, best_margins, comparable, least_per_state, margins_of
-from irl_gym.mdp.optimality_rows import Comparisons, as_compared, compare
-from irl_gym.mdp.planning.dynamic_programming import optimum
+from irl_gym.mdp.margins import Margins, comparable, least_per_state, margins_under
+from irl_gym.mdp.optimality_rows import Comparisons, compare
 from irl_gym.mdp.policies import as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import counted_table
@@ -112,19 +111,16 @@ class Optimality:
 
     def _of_states(self) -> Iterator[Fact]:
         if self.violated.size:
-            rows, most = counted(len(self.violated_rows), "row"), f"{self.worst_violation:.3g}"
-            told = f"in {counted(self.violated.size)} another action is better under it: {rows} of (4), by at most {most}"
-            yield Fact("violated", told, "bad")
+            yield Fact("violated", violated_told(self.violated.size, len(self.violated_rows), self.worst_violation), "bad")
         if self.tied.size and not self.zero:
             told = f"in {counted(self.tied.size)} another action is as good as the expert's to rounding, and none better"
             yield Fact("tied", told, "open")
         if self.unsettled.size:
-            told = f"in {counted(self.unsettled.size)} a margin is within its sampling error, and may be noise"
-            yield Fact("left open by the counts", f"{told}; more steps to count tell", "open")
+            yield Fact("left open by the counts", f"{unsettled_told(self.unsettled.size)}; more steps to count tell", "open")
         if self.inseparable.size:
-            sure = "" if self.sampling_error is None else ", as far as the counts tell"
-            told = f"in {counted(self.inseparable.size)} an action leads where the expert's own does{sure}: no reward on states"
-            yield Fact("cannot be settled", f"{told} tells them apart, one on states and actions can", "open")
+            told = alike_told(self.inseparable.size, estimated=self.sampling_error is not None)
+            told = f"{told}: no reward on states tells them apart, one on states and actions can"
+            yield Fact("cannot be settled", told, "open")
         if self.unconstrained.size:
             told = f"in {counted(self.unconstrained.size)} no action that the expert leaves out can be told from its own"
             yield Fact("without a comparison", told)
@@ -139,6 +135,23 @@ class Optimality:
     def to_json(self) -> dict[str, Any]:
         """As json holds it: NaN and infinity become None."""
         return plain(self, "degenerate")
+
+
+def violated_told(states: int, rows: int, worst: float) -> str:
+    """That (4) is violated."""
+    return f"in {counted(states)} another action is better under it: {counted(rows, 'row')} of (4), by at most {worst:.3g}"
+
+
+def alike_told(states: int, *, estimated: bool) -> str:
+    """That actions have the successors of the expert's."""
+    return (
+        f"in {counted(states)} an action leads where the expert's own does{', as far as the counts tell' if estimated else ''}"
+    )
+
+
+def unsettled_told(states: int) -> str:
+    """That counts leave margins open."""
+    return f"in {counted(states)} a margin is within its sampling error, and may be noise"
 
 
 def certify(
@@ -175,9 +188,8 @@ def certify(
     part, R = mdp.restrict(rows), reward.of_rows(rows)
     unknown = ~known[rows] & ~part.terminal
     c = compare(part, distribution[rows], np.flatnonzero(~unknown))
-    found = optimum(as_compared(part, c, R.on_states), R)
     best = errs or bool(unknown.any())
-    margins = best_margins(found, c) if best else margins_of(found, c)
+    found, margins = margins_under(part, c, R, best=best)
     loss = loss_on(part, found, c.distribution, unknown)
     paid = R.values if R.on_states else R.values[~part.terminal]
     largest = float(np.abs(paid).max(initial=0.0))

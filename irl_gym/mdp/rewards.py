@@ -43,6 +43,8 @@ class TabularReward:
     """
 
     FORMATS: ClassVar[tuple[str, ...]] = (FORMAT,)
+    alpha: ClassVar[None] = None
+    """No weights: it is of rows, not of observations (`irl_gym.features.linear_reward.LinearReward`)."""
 
     values: np.ndarray
     """(S,) or (S, A) float64."""
@@ -85,6 +87,10 @@ class TabularReward:
     def on_states(self) -> bool:
         """Is this a reward on states, paid on arrival?"""
         return self.values.ndim == 1
+
+    def tabular(self, states: Any) -> "TabularReward":
+        """Itself: a reward of rows is in a table, whatever the rows stand for."""
+        return self
 
     def of_rows(self, rows: np.ndarray) -> "TabularReward":
         """The same reward on some of the states only, renumbered in the order given."""
@@ -198,6 +204,19 @@ def as_reward(reward: Any) -> TabularReward:
         InvalidReward: an array of another shape, or with values that are not finite.
     """
     return reward if isinstance(reward, TabularReward) else TabularReward(reward)
+
+
+def in_table(reward: Any, states: Any) -> TabularReward:
+    """A reward of any kind in a table.
+
+    Args:
+        reward: what has `tabular`, or an array (S,) or (S, A).
+        states: what rows stand for, or how many there are.
+
+    Raises:
+        InvalidReward: an array of another shape, or with values that are not finite.
+    """
+    return reward.tabular(states) if hasattr(reward, "tabular") else as_reward(reward)
 
 
 def plain_json(value: Any) -> Any:

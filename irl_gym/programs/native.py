@@ -26,7 +26,7 @@ LONGEST = 4e6
 
 ERRORS = (ArithmeticError, MemoryError, RuntimeError, ValueError)
 """That a child answers with; any other ends it."""
-Program = tuple[np.ndarray, Any, np.ndarray, int, np.ndarray | None, np.ndarray | None]
+NativeProgram = tuple[np.ndarray, Any, np.ndarray, int, np.ndarray | None, np.ndarray | None]
 """c (n,), A (m, n) by columns, b (m,), the number of rows that are equations, lower and upper (n,), None for none."""
 
 
@@ -45,7 +45,7 @@ def singular_values(matrix: np.ndarray) -> np.ndarray:
     return np.linalg.svd(matrix, compute_uv=False)
 
 
-def clarabel(program: Program, options: dict[str, Any], until: float) -> Any:
+def clarabel(program: NativeProgram, options: dict[str, Any], until: float) -> Any:
     """What Clarabel says of a program, as cvxpy reads it."""
     import clarabel as module
 
@@ -66,7 +66,7 @@ def clarabel(program: Program, options: dict[str, Any], until: float) -> Any:
     )  # fmt: skip
 
 
-def highs(program: Program, options: dict[str, Any], until: float) -> Any:
+def highs(program: NativeProgram, options: dict[str, Any], until: float) -> Any:
     """What HiGHS says of a program, as cvxpy reads it."""
     import highspy
 

@@ -58,7 +58,7 @@ class Answer:
 class _Solver:
     cvxpy_name: str
     options: dict[str, Any]
-    run: Callable[[native.Program, dict[str, Any], float], Any]
+    run: Callable[[native.NativeProgram, dict[str, Any], float], Any]
 
 
 _SOLVERS = {
@@ -179,6 +179,6 @@ def _attempt(problem: cp.Problem, name: str, deadline: Deadline) -> str | None:
     return str(problem.status)
 
 
-def _operations(program: native.Program) -> float:
+def _operations(program: native.NativeProgram) -> float:
     """Of a factorisation in which nothing is sparse: more than one iteration can take."""
     return float(sum(program[1].shape)) ** 3 / 3

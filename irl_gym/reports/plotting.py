@@ -30,7 +30,7 @@ from irl_gym.tables.layouts import GridLayout
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class DrawnCurve:
     """A learning curve."""
 
     steps: np.ndarray
@@ -174,7 +174,7 @@ def draw_policies(
 
 
 def draw_learning_curve(
-    curves: Mapping[str, Curve],
+    curves: Mapping[str, DrawnCurve],
     *,
     expert: float,
     random: float,

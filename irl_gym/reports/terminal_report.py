@@ -13,7 +13,7 @@ from rich.text import Text
 from irl_gym.demonstrations.endings import LOST
 from irl_gym.facts import Fact
 from irl_gym.files.run_folder import read_json
-from irl_gym.files.run_schema import Diagnosed, Environment
+from irl_gym.files.run_schema import Diagnosed, EnvironmentFile
 from irl_gym.judging import measures
 from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.estimated import errors_told
@@ -95,7 +95,7 @@ def _lost(told: Mapping[str, Any]) -> Iterator[RenderableType]:
 def _recorded_in(out: Path) -> str:
     """The id of the environment that a dataset brought with it, where it has one."""
     kept = out / ENVIRONMENT
-    found = read_json(kept, Environment)["id"] if kept.exists() else None
+    found = read_json(kept, EnvironmentFile)["id"] if kept.exists() else None
     return f"{found}, " if found else ""
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from irl_gym.facts import Fact, facts_of
-from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
 from irl_gym.files.run_folder import read_json
 from irl_gym.learners.base import Outcome
@@ -35,7 +34,7 @@ def certificate_of(result: Outcome, known: tuple[Tabulation, Any] | None, *, epi
     if known is None or result.reward is None:
         return {"optimality": None, "proof": proof}
     table, expert = known
-    reward = result.reward.tabular(table.states) if isinstance(result.reward, LinearReward) else result.reward
+    reward = result.reward.tabular(table.states)
     found = certified(table, expert, reward, proof, episodes=episodes)
     return {"optimality": optimality_told(found, table), "proof": proof}
 

@@ -17,7 +17,7 @@ from irl_gym.checks import checked_number
 from irl_gym.demonstrations.endings import AfterEnd, checked_after_end
 from irl_gym.errors import InvalidParameter
 from irl_gym.features.feature_maps import FeatureMap
-from irl_gym.learners.base import Learner
+from irl_gym.learners.base import Learner, checked_learner
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.rewards import plain_json
 from irl_gym.mdp.tabular_mdp import check_discount
@@ -96,9 +96,7 @@ class Experiment:
                 f"start_seeds is {self.start_seeds!r} and reveal {self.reveal!r}, but the environment is the dataset's: "
                 "expected neither. Name env_id, or leave them out."
             )
-        if not is_dataclass(self.learner) or isinstance(self.learner, type) or not isinstance(self.learner, Learner):
-            what = "a frozen dataclass with `needs` and `learn`, such as FiniteLP()"
-            raise InvalidParameter(f"learner is {self.learner!r:.80}: expected {what}.")
+        checked_learner(self.learner)
         checked_epsilon(self.epsilon)
         checked_after_end(self.after_end)
         if self.dataset is not None and (self.expert is not None or self.epsilon):
@@ -199,7 +197,7 @@ def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, 
     `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
 
     Raises:
-        InvalidParameter: neither.
+        InvalidParameter: neither, or a name twice.
     """
     if len(parts) == 1 and parts[0].lstrip().startswith("{"):
         try:
@@ -211,6 +209,8 @@ def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, 
         name, equals, text = part.partition("=")
         if not equals or not name.isidentifier():
             raise InvalidParameter(f"{what} has {part!r}: expected name=value, such as map_name=8x8.")
+        if name in found:
+            raise InvalidParameter(f"{what} has {part!r} after {name}={found[name]!r}: expected each name once. Leave one out.")
         try:
             found[name] = json.loads(text)
         except ValueError:

@@ -80,7 +80,7 @@ def load_film(path: Path) -> Film:
         OSError: a file is missing.
         DamagedFile: it holds something else. The kind of its pictures is part of their names: it is one of two.
     """
-    told: Any = read_json(path, run_schema.Film)
+    told: Any = read_json(path, run_schema.FilmFile)
     pictures = (path.with_suffix("") / f"{number:03d}.{told['kind']}" for number in range(told["frames"]))
     return Film(
         told["name"], told["seed"], tuple(Moment(**one) for one in told["steps"]), told["ends"],

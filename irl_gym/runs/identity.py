@@ -18,7 +18,7 @@ from minari.serialization import serialize_space
 from irl_gym.errors import RunConflict, RunNewer
 from irl_gym.files.run_folder import (
     NOT_THE_SAME,
-    RECORDS,
+    STAGE_RECORDS,
     START,
     RunFolder,
     changed,
@@ -41,7 +41,7 @@ STAGES = (*FIRST, "record", "ambiguity", "report")
 VERSION, ENVIRONMENT = "run.json", "environment.json"
 PROGRAM = ["python", "scripts/recover_and_retrain.py"]
 """How a run's command begins, unless another program started it."""
-AGAIN = "runs/again"
+NEW_FOLDER = "runs/again"
 """The folder of a run that is made again."""
 
 
@@ -64,7 +64,7 @@ def claim(path: Path, config: dict[str, Any]) -> None:
     before = known.read_bytes() if known.exists() else None
     RunFolder(path, config)
     if before not in (None, known.read_bytes()):
-        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT, f"{RECORDS}/{START}.json"):
+        for name in (TABLE, UNDER_WAY, VERSION, ENVIRONMENT, f"{STAGE_RECORDS}/{START}.json"):
             (path / name).unlink(missing_ok=True)
     recorded = (read_record(path, START) or {}).get("sha256", {})
     other = changed(path, {"sha256": {name: one for name, one in recorded.items() if name in (VERSION, ENVIRONMENT)}})
@@ -134,7 +134,7 @@ def record_start(path: Path, *, table_kept: bool) -> None:
         write_record(path, START, now)
 
 
-def into_folder(command: Sequence[str], folder: str = AGAIN) -> list[str]:
+def into_folder(command: Sequence[str], folder: str = NEW_FOLDER) -> list[str]:
     """The command with another --out.
 
     The default makes the run again: in the run's own folder everything is there already, and would be kept. A run that was

@@ -38,9 +38,14 @@ class Pool:
         return next(iter(self.runs.values()))
 
     @cached_property
+    def policies_of_runs(self) -> dict[str, Mapping[str, Any]]:
+        """What metrics.json says of each policy, by run."""
+        return {name: run.metrics["policies"] for name, run in self.runs.items()}
+
+    @cached_property
     def policies(self) -> list[str]:
         """The names of the policies that all runs judged."""
-        rows = [run.metrics["policies"] for run in self.runs.values()]
+        rows = [*self.policies_of_runs.values()]
         return [name for name in rows[0] if all(name in row for row in rows)]
 
     @property
@@ -50,7 +55,7 @@ class Pool:
 
     def scores_of(self, name: str) -> np.ndarray | None:
         """(n,) score of each run's policy of a name; None where a run has none."""
-        found = [run.metrics["policies"][name]["score"] for run in self.runs.values()]
+        found = [rows[name]["score"] for rows in self.policies_of_runs.values()]
         return None if any(one is None for one in found) else np.array(found, dtype=np.float64)
 
     def score_of(self, name: str) -> Interval | None:
@@ -71,7 +76,7 @@ class Pool:
     @cached_property
     def mean_returns(self) -> dict[str, Interval]:
         """The interquartile means of mean undiscounted returns, by policy."""
-        rows = [run.metrics["policies"] for run in self.runs.values()]
+        rows = self.policies_of_runs.values()
         return {
             name: over_seeds(np.array([row[name]["mean_return"] for row in rows], dtype=np.float64)) for name in self.policies
         }

@@ -14,12 +14,13 @@ from gymnasium import spaces
 
 from irl_gym.errors import InvalidInput, RunIncomplete
 from irl_gym.features.linear_reward import LinearReward, load_reward
-from irl_gym.files.archives import json_in, read_arrays
+from irl_gym.files.archives import read_arrays
 from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
-from irl_gym.files.run_schema import Config, Diagnosed, Environment, Grid, Version, checked
+from irl_gym.files.run_schema import Config, Diagnosed, EnvironmentFile, Grid, Version, checked
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
+from irl_gym.judging.diagnoses.findings import row_of
 from irl_gym.judging.diagnoses.plain_words import with_names
 from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
@@ -31,6 +32,7 @@ from irl_gym.runs.reading.belonging import left_open, strangers
 from irl_gym.runs.reading.run_reader import RunReader
 from irl_gym.runs.reading.verified import Claim, again, claims, recomputed, with_again
 from irl_gym.runs.scorecard import reward_told
+from irl_gym.runs.supply import supplied
 from irl_gym.spaces.listed_states import usual_observation
 from irl_gym.spaces.names import state_name
 from irl_gym.spaces.space_json import told_space
@@ -80,8 +82,8 @@ class Run:
     widths: Mapping[str, np.ndarray] | None
     """low, high, width: (S,) how far the reward of a state is left open; NaN where it is never reached."""
     lambda_path: Mapping[str, Any] | None
-    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,), changes (a list);
-    exact, whether these are all pieces, and gap, what others can be worth."""
+    """breakpoints (k+1,), rewards (k, S) or (k, S, A), margins (k, S), l1_norms (k,), total_margins (k,); exact, whether these
+    are all pieces, and gap, what others can be worth; r_max and margin_cap of its program, NaN where margins have no cap."""
     vouched: bool
     """Is a digest recorded of each file that was read here? They were compared. False: an earlier version made the run."""
     recomputed: bool = False
@@ -92,9 +94,7 @@ class Run:
     @property
     def tabular(self) -> TabularReward | None:
         """The recovered reward on the rows of the table; None where there is none."""
-        if self.table is None:
-            return None
-        return self.learned.tabular(self.table.states) if isinstance(self.learned, LinearReward) else self.learned
+        return None if self.table is None or self.learned is None else self.learned.tabular(self.table.states)
 
     @property
     def command(self) -> str | None:
@@ -120,9 +120,9 @@ class Run:
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
-    def worded(self, sentence: str) -> str:
-        """A sentence with states and actions by their names, where there is a table."""
-        return sentence if self.table is None else with_names(sentence, self.state_name, self.actions)
+    def place_name(self, state: int, action: int | None = None) -> str:
+        """A state, or a state and an action, by number, with their names behind where there is a table."""
+        return row_of(state, action) if self.table is None else with_names(state, action, self.state_name, self.actions)
 
     def state_name(self, row: int) -> str:
         """What a state is called: its observation, in words.
@@ -200,8 +200,8 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         lambda_path=reader.maybe("ambiguity.npz", lambda one: _part(one, "path")),
         vouched=reader.files <= {name for one in records.values() for name in one.get("sha256", ())},
     )  # fmt: skip
-    _check_together(run, reader)
-    return _with_proof(run, reader)
+    supplied(_check_together, run, reader=reader)
+    return replace(run, **supplied(_computed, run, reader=reader))
 
 
 def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
@@ -215,7 +215,7 @@ def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str
 
 
 def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    content = read_json(path, Environment)
+    content = read_json(path, EnvironmentFile)
     return content["id"], told_space("observations", content["observations"]), tuple(content["actions"])
 
 
@@ -229,57 +229,61 @@ def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Sp
     return reader.read(TABLE, lambda path: load_table(path, observations))
 
 
-def _check_together(run: Run, reader: RunReader) -> None:
+def _check_together(
+    table: Tabulation | None, learned: TabularReward | LinearReward | None, expert: np.ndarray | None, agent: np.ndarray | None,
+    actions: tuple[str, ...], grid: GridLayout | None, diagnosis: Mapping[str, Any] | None,
+    widths: Mapping[str, np.ndarray] | None, lambda_path: Mapping[str, Any] | None, reader: RunReader,
+) -> None:  # fmt: skip
     """Check that what lies beside a table is of that table.
 
     Raises:
         RunIncomplete: something is not, by the name of its file.
     """
-    if run.table is None:
+    if table is None:
         return
-    rewards = {"reward.npz": run.learned.values} if isinstance(run.learned, TabularReward) else {}  # weights are of features
-    policies = {name: one for name, one in (("expert.npz", run.expert), ("agent_policy.npz", run.agent)) if one is not None}
-    shape = run.table.mdp.n_states, run.table.mdp.n_actions
-    found = strangers(shape, run.actions, rewards, policies, run.grid, run.diagnosis)
-    for fault in itertools.chain(found, left_open(shape, run.widths, run.lambda_path)):
+    rewards = {} if learned is None or learned.alpha is not None else {"reward.npz": learned.values}  # weights are of features
+    policies = {name: one for name, one in (("expert.npz", expert), ("agent_policy.npz", agent)) if one is not None}
+    shape = table.mdp.n_states, table.mdp.n_actions
+    found = strangers(shape, actions, rewards, policies, grid, diagnosis)
+    for fault in itertools.chain(found, left_open(shape, widths, lambda_path)):
         raise reader.incomplete(fault)
 
 
-def _with_proof(run: Run, reader: RunReader) -> Run:
-    """The run with what metrics.json says of its reward and policies as its files give it now, where they do.
+def _computed(
+    path: Path, config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]], certificate: Mapping[str, Any],
+    metrics: Mapping[str, Any], table: Tabulation | None, expert: np.ndarray | None, agent: np.ndarray | None,
+    tabular: TabularReward | None, curve: Curve, reader: RunReader,
+) -> dict[str, Any]:  # fmt: skip
+    """What metrics.json says of a run's reward and policies as its files give it now, where they do: the fields that change.
 
     Raises:
         RunIncomplete: they contradict what was recorded.
     """
-    told = claims(run.config, run.stages, run.certificate, run.metrics, run.table)
-    _check_claims(told, run, reader)
-    reward = run.tabular
-    if run.table is None or reward is None:
-        return run
+    _check_claims(claims(config, stages, certificate, metrics, table), metrics, reader)
+    if table is None or tabular is None:
+        return {}
     try:
-        found = recomputed(run.path, run.config, run.certificate, run.table, run.expert, reward)
-        now = again(run.config, run.metrics, run.table, run.expert, run.agent, reward, run.curve)
+        found = recomputed(path, config, certificate, table, expert, tabular)
+        now = again(config, metrics, table, expert, agent, tabular, curve)
     except InvalidInput as error:
         mend = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
         raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {mend}") from error
-    metrics = run.metrics
     if now is not None:
-        _check_claims(now[0], run, reader)
+        _check_claims(now[0], metrics, reader)
         metrics = with_again(metrics, now[1])
-    certificate = run.certificate if found is None else {**run.certificate, "optimality": found}
+    certificate = certificate if found is None else {**certificate, "optimality": found}
     metrics = {**metrics, "reward": {**metrics["reward"], **reward_told(certificate)}}
-    return replace(run, certificate=certificate, metrics=metrics, recomputed=found is not None, judged_again=now is not None)
+    return {
+        "certificate": certificate, "metrics": metrics, "recomputed": found is not None, "judged_again": now is not None,
+    }  # fmt: skip
 
 
-def _check_claims(told: Iterable[Claim], run: Run, reader: RunReader) -> None:
+def _check_claims(told: Iterable[Claim], metrics: Mapping[str, Any], reader: RunReader) -> None:
     for one in told:
-        if (fault := one.fault(run.metrics)) is not None:
+        if (fault := one.fault(metrics)) is not None:
             raise reader.incomplete(fault)
 
 
 def _part(path: Path, name: str) -> dict[str, Any] | None:
-    """The arrays whose names begin so; what is text is json."""
-    arrays = read_arrays(path)
-    found = {key: one for key, one in arrays.items() if key.startswith(f"{name}.")}
-    told = {key: json_in(arrays, key) if one.dtype.kind == "U" else one for key, one in found.items()}
-    return {key.partition(".")[2]: one for key, one in told.items()} or None
+    """The arrays whose names begin so."""
+    return {key.removeprefix(f"{name}."): one for key, one in read_arrays(path).items() if key.startswith(f"{name}.")} or None

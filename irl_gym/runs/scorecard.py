@@ -20,7 +20,7 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import claims_in
 from irl_gym.tables.tabulation import Tabulation
 
-RECORDS = ("expert", "demonstrations", "reward", "agent")
+TOLD_STAGES = ("expert", "demonstrations", "reward", "agent")
 """The stages whose records are told."""
 NEARLY_ALL = 0.99
 """A score that the learning curve is reported to reach for good, beside `shares.GOOD`."""
@@ -43,7 +43,7 @@ def scorecard(
 
     Args:
         config: the run's.
-        records: of the stages in `RECORDS`.
+        records: of the stages in `TOLD_STAGES`.
         certificate: the content of certificate.json.
         policies: their rows, by `evaluation.evaluate`.
         scale: of scores, by the same.

@@ -24,7 +24,6 @@ from irl_gym.environments.reveal import layers
 from irl_gym.environments.tabular_env import TabularEnv
 from irl_gym.environments.watching_wrappers import only_watches
 from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
-from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.spaces.states import StateIndex
@@ -238,8 +237,9 @@ def _model(env: gym.Env, gamma: float) -> Tabulation | None:
 
 def _with_reward(found: Tabulation, learned: LearnedReward) -> Tabulation:
     """The table with the reward that LearnedReward pays."""
-    mdp, paid = found.mdp, learned.reward_function
-    if isinstance(paid, LinearReward):
+    mdp = found.mdp
+    paid: Any = learned.reward_function
+    if hasattr(paid, "tabular"):
         paid = paid.tabular(found.states if learned.states is None else learned.states.n_states)
     if learned.states is not None and learned.states.n_states != mdp.n_states:
         raise InvalidReward(

@@ -26,6 +26,7 @@ from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.runs.diagnosed import diagnose_run
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 from irl_gym.tables.counted.counting import Counting
 
 ID = "me/log-v0"
@@ -160,12 +161,12 @@ def test_a_log_of_taxi_without_next_observations_teaches_the_drop_off(log, tmp_p
     rows = report.metrics["policies"]
     assert rows["expert"]["mean_return"] > 7 and rows["retrained"]["mean_return"] > 7
     assert report.metrics["demonstrations"]["followed"] == 300
-    assert not {"dropped-actions", "unseen-ends"} & set(diagnose_run(read_run(report.out)).names)
+    assert not {"dropped-actions", "unseen-ends"} & set(supplied(diagnose_run, read_run(report.out)).names)
 
 
 @pytest.mark.filterwarnings("ignore:the last action of")
 def test_a_run_on_a_log_that_lost_its_last_actions_says_so(log, tmp_path):
     report = run_of(log, tmp_path, last="drop")
     assert report.metrics["demonstrations"]["dropped"] == 300
-    (found,) = (each for each in diagnose_run(read_run(report.out)).findings if each.name == "dropped-actions")
+    (found,) = (each for each in supplied(diagnose_run, read_run(report.out)).findings if each.name == "dropped-actions")
     assert "The last action of 300 of 300 episodes was dropped" in found.sentence and "last='keep'" in found.mend

@@ -62,6 +62,10 @@ def changed(root, **content):
     path.write_text(json.dumps(json.loads(path.read_text()) | content))
 
 
+OLD = {"name": "Reveal", "entry_point": "irl_gym.reveal:Reveal", "kwargs": {"reveal": {}}}
+"""A wrapper as an earlier version named it."""
+
+
 def recorded_in(root, **changes):
     """The dataset with other words of where it was recorded."""
     told = json.loads(json.loads((root / ID / "data" / "metadata.json").read_text())["env_spec"])
@@ -259,6 +263,9 @@ CASES = [
     ("Install or import the package that registers it,", lacks_a_package, installed),
     ("or name an environment with --env-id.",
      lacks_a_package, lambda root: environment_of("FrozenLake-v1", {}, ID, str(root))),
+    ("Name an environment with --env-id.",
+     lambda root: recorded_in(root, additional_wrappers=[OLD]) or environment_of(None, {}, ID, str(root)),
+     lambda root: read(root, env=environment_of("FrozenLake-v1", {}, ID, str(root)))),
     ("Is it another version? Name an environment with --env-id.",
      lambda root: recorded_in(root, kwargs={"colour": 1}) or environment_of(None, {}, ID, str(root)),
      lambda root: environment_of("FrozenLake-v1", {}, ID, str(root))),

@@ -82,6 +82,13 @@ def test_a_wrapper_that_is_not_known_is_refused_by_name(dataset, evil, entry_poi
     assert not evil.exists()
 
 
+@pytest.mark.parametrize("entry_point", ["irl_gym.reveal:Reveal", "irl_gym.starts:SeededStarts"])
+def test_a_wrapper_of_an_older_irl_gym_is_told_with_what_it_is_called_here(dataset, entry_point):
+    called = rf"irl_gym\.environments\.\w+:{entry_point.partition(':')[2]}"
+    with pytest.raises(UnknownEnvironment, match=rf"'{entry_point}', of another version of irl_gym: expected {called}"):
+        recorded_environment(dataset(spec=wrapper(entry_point)))
+
+
 def test_a_wrapper_of_gymnasium_is_taken_from_gymnasium_whatever_module_the_file_names(dataset):
     env = recorded_environment(dataset(spec=wrapper("gymnasium.wrappers.evil:ClipReward", min_reward=0.0, max_reward=0.5)))
     assert type(env) is gym.wrappers.ClipReward

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from irl_gym.files.pickles import Call, Name, as_numbers, read_pickle
+from irl_gym.files.pickles import PickledCall, PickledName, as_numbers, read_pickle
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=9) | st.binary(max_size=9),
@@ -50,13 +50,13 @@ def test_any_bytes_are_read_or_refused(tail, at, byte):
 def test_what_a_pickle_would_call_is_a_record_and_is_not_called(tmp_path):
     raw = pickle.dumps({"state": Command(tmp_path / "called")})
     found = read_pickle(raw)["state"]
-    assert isinstance(found, Call) and isinstance(found.maker, Name) and found.maker.name == "system"
+    assert isinstance(found, PickledCall) and isinstance(found.maker, PickledName) and found.maker.name == "system"
     assert not (tmp_path / "called").exists()
 
 
 def test_no_module_is_imported_that_a_pickle_names(monkeypatch):
     raw = pickletools.optimize(b"\x80\x02cnobody_has_this_module\nthing\n)R.")
-    assert read_pickle(raw).maker == Name("nobody_has_this_module", "thing")
+    assert read_pickle(raw).maker == PickledName("nobody_has_this_module", "thing")
 
 
 @pytest.mark.parametrize("protocol", [4, 5])
@@ -109,9 +109,9 @@ def test_tuples_within_tuples_are_neither_hashed_nor_written_out(raw):
     [((), (3, "<"), "none"), (("f8",), (3,), "none"), (("f8",), {"a": 1}, "none"), ((1,), (3, "<"), "without a name")],
 )
 def test_an_array_of_an_odd_dtype_is_refused(kind, state, match):
-    dtype = Call(Name("numpy", "dtype"), kind, state)
+    dtype = PickledCall(PickledName("numpy", "dtype"), kind, state)
     with pytest.raises(ValueError, match=match):
-        as_numbers(Call(Name("numpy._core.numeric", "_frombuffer"), (bytes(8), dtype, (1,), "C")))
+        as_numbers(PickledCall(PickledName("numpy._core.numeric", "_frombuffer"), (bytes(8), dtype, (1,), "C")))
 
 
 def test_a_number_that_is_no_float_is_refused():

@@ -10,6 +10,9 @@ from irl_gym.errors import RunIncomplete
 from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.runs.run import read_run
 
+TIED = {"name": "ties", "sentence": "Tied in {where}.", "mend": "x", "states": [5, 6], "actions": [0, 1], "flags": []}
+"""A finding of the doctor, in json."""
+
 
 def put(content, to, value):
     """Content of json with one entry changed, by its dotted name; `...` leaves it out."""
@@ -62,8 +65,11 @@ def test_an_entry_that_no_run_says_is_named_with_its_file_and_what_was_expected(
     [
         ("environment.json", "actions", ["left"], "environment.json names 1 actions, but the table has 4"),
         ("grid.json", "shape", [2, 2], "grid.json cannot be read"),
-        ("diagnosis.json", "findings", [{"name": "x", "sentence": "In s=99.", "mend": "x", "states": [], "actions": [],
-                                         "flags": []}], "diagnosis.json speaks of s=99, but the table has 16 states"),
+        ("diagnosis.json", "findings", [TIED | {"states": [5, 99]}], "has 99 among the states of 'ties', of 16 in the table"),
+        ("diagnosis.json", "findings", [TIED | {"actions": [4, 0]}], "has 4 among the actions of 'ties', of 4 in the table"),
+        ("diagnosis.json", "findings", [TIED | {"actions": [0]}], "cannot be read.*expected an action for each of its states"),
+        ("diagnosis.json", "findings", [TIED | {"states": [-1, 5]}], "cannot be read.*expected greater than or equal to 0"),
+        ("diagnosis.json", "findings", [TIED | {"states": ["5", 6]}], "cannot be read.*expected a whole number"),
     ],
 )  # fmt: skip
 def test_an_entry_of_another_table_is_named_with_its_file(unvouched, name, entry, value, told):
@@ -76,7 +82,8 @@ def test_an_entry_of_another_table_is_named_with_its_file(unvouched, name, entry
 
 @pytest.mark.parametrize("change", [
     {"widths.low": np.zeros(15)}, {"path.rewards": np.zeros((3, 15))}, {"path.margins": np.full((18, 16), np.inf)},
-    {"path.changes": np.array("{}")}, {"path.breakpoints": np.full(19, -1.0)},
+    {"path.r_max": np.array(0.0)}, {"path.margin_cap": np.array(-1.0)},
+    {"path.total_margins": np.zeros(3)}, {"path.breakpoints": np.full(19, -1.0)},
 ])  # fmt: skip
 def test_what_is_left_open_of_another_table_is_named(unvouched, change):
     with np.load(unvouched / "ambiguity.npz") as file:

@@ -29,6 +29,7 @@ from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.identity import claim
 from irl_gym.runs.reading.unfinished import left_behind
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 from irl_gym.tables.table_files import kept_table
 
 ASKED = Experiment("FrozenLake-v1", 0.9, retrain=ValueIteration(), episodes=3, eval_episodes=3, num_envs=2)
@@ -64,7 +65,7 @@ def read_comparison(folder):
 
 def read_diagnosis(folder):
     diagnose_unfinished(folder)
-    found = diagnose_run(read_run(folder))
+    found = supplied(diagnose_run, read_run(folder))
     assert found.examined and all(one.sentence and one.mend for one in found.findings)
 
 

@@ -25,6 +25,7 @@ from irl_gym.runs.diagnosed import diagnose_run
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.named_parts import features_named
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 from irl_gym.tables.enumeration.table import Enumeration
 
 LAKE_DATA, CAR_DATA, CART_DATA = (f"irl_gym/{name}-expert-v0" for name in ("frozenlake-v1", "mountaincar-v0", "cartpole-v1"))
@@ -138,7 +139,7 @@ def test_the_metrics_have_the_documented_keys(runs, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_run_tells_what_the_doctor_finds_in_its_folder(runs, name):
     told = json.loads((runs(name).out / "diagnosis.json").read_text())
-    assert [one["name"] for one in told["findings"]] == list(diagnose_run(read_run(runs(name).out)).names)
+    assert [one["name"] for one in told["findings"]] == list(supplied(diagnose_run, read_run(runs(name).out)).names)
 
 
 @pytest.mark.parametrize("name", NAMES)

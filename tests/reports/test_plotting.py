@@ -15,7 +15,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.mdp.planning.dynamic_programming import tied, value_iteration
 from irl_gym.reports import drawing
 from irl_gym.reports.plotting import (
-    Curve,
+    DrawnCurve,
     draw_learning_curve,
     draw_policies,
     draw_returns,
@@ -210,19 +210,19 @@ def test_draw_policies_counts_actions_when_there_is_no_map(taxi):
 
 
 def test_draw_learning_curve_names_the_levels():
-    figure = draw_learning_curve({"learned": Curve(np.arange(5), np.arange(5.0))}, expert=4.0, random=-1.0)
+    figure = draw_learning_curve({"learned": DrawnCurve(np.arange(5), np.arange(5.0))}, expert=4.0, random=-1.0)
     assert texts(figure.axes[0]) == ["expert 4", "random -1"]
 
 
 def test_draw_learning_curve_has_a_band_when_an_interval_is_given():
     y = np.arange(5.0)
-    figure = draw_learning_curve({"learned": Curve(np.arange(5), y, y - 1, y + 1)}, expert=4.0, random=0.0)
+    figure = draw_learning_curve({"learned": DrawnCurve(np.arange(5), y, y - 1, y + 1)}, expert=4.0, random=0.0)
     assert len(figure.axes[0].collections) == 1
 
 
 def test_draw_learning_curve_refuses_curves_of_unequal_length():
     with pytest.raises(InvalidParameter, match="5 steps and 4 values"):
-        draw_learning_curve({"learned": Curve(np.arange(5), np.arange(4.0))}, expert=1.0, random=0.0)
+        draw_learning_curve({"learned": DrawnCurve(np.arange(5), np.arange(4.0))}, expert=1.0, random=0.0)
 
 
 def test_draw_learning_curve_refuses_no_curve():

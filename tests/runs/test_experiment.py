@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from irl_gym.agents.planners import SB3, ValueIteration
+from irl_gym.commands.arguments import parse_reveal
 from irl_gym.errors import InvalidDiscount, InvalidParameter
 from irl_gym.features.bases import Fourier, RadialBasis
 from irl_gym.features.feature_maps import Functions, OneHot, Table, Unravel
@@ -40,6 +41,12 @@ def test_parse_keywords_reads(parts, expected):
 def test_parse_keywords_refuses(part):
     with pytest.raises(InvalidParameter, match="expected"):
         parse_keywords((part,))
+
+
+@pytest.mark.parametrize("read", [parse_keywords, parse_reveal])
+def test_a_name_that_is_given_twice_is_refused_with_both_values(read):
+    with pytest.raises(InvalidParameter, match=r"has 'a=2' after a=1: expected each name once\. Leave one out\."):
+        read(("a=1", "a=2"))
 
 
 def test_experiments_that_differ_have_names_that_differ():

@@ -23,8 +23,8 @@ from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.world_choice import place_of
 from irl_gym.loop.worlds import SteppedWorld
-from irl_gym.runs.experiment import Experiment
-from irl_gym.runs.identity import AGAIN, claim
+from irl_gym.runs.experiment import Experiment, parse_keywords
+from irl_gym.runs.identity import NEW_FOLDER, claim
 from irl_gym.runs.run import read_run
 from irl_gym.tables.counted.counting import Interaction
 
@@ -75,6 +75,7 @@ CASES = [
      lambda _: asking(env_id=None, dataset="me/a-v0")),
     ("Leave expert and epsilon out.", lambda _: asking(dataset="me/a-v0", epsilon=0.1), lambda _: asking(dataset="me/a-v0")),
     ("Leave one out.", lambda _: asking(table=Interaction(9), bins=3), lambda _: asking(bins=3)),
+    ("Leave one out.", lambda _: parse_keywords(["a=1", "a=2"]), lambda _: parse_keywords(["a=2"])),
     # places
     ("Leave bins out.", lambda path: place(path, bins=3), lambda path: isinstance(place(path), TableWorld)),
     ("Register it.", lambda _: stepped(Car()), lambda _: registered()),
@@ -110,7 +111,7 @@ def test_a_mend_that_an_error_about_a_run_names_serves(tmp_path, says, breaks, m
 def as_told(run):
     """The command of a message: what it asks for."""
     words = shlex.split(told(read_run, run).rpartition(": ")[2])
-    return words[:2] == [*COMMAND[:2]] and tyro.cli(Arguments, args=words[2:], config=OPTIONS).out == Path(AGAIN)
+    return words[:2] == [*COMMAND[:2]] and tyro.cli(Arguments, args=words[2:], config=OPTIONS).out == Path(NEW_FOLDER)
 
 
 def of_version_2(run):

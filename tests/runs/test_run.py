@@ -54,7 +54,7 @@ def test_a_map_is_read_as_it_was_written(toy_text):
 def test_a_run_holds_widths_and_lambda_path(run):
     assert np.array_equal(run.widths["width"], run.widths["high"] - run.widths["low"], equal_nan=True)
     path = run.lambda_path
-    assert len(path["breakpoints"]) == len(path["changes"]) == len(path["rewards"]) + 1
+    assert len(path["breakpoints"]) == len(path["rewards"]) + 1 and path["r_max"] == 1.0 and path["margin_cap"] > 0
 
 
 def test_the_diagnosis_is_the_doctors(run):

@@ -10,7 +10,7 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.loop.loop import MAKERS, Loop
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.worlds import SteppedWorld
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.report import SECTIONS, facts
 from irl_gym.reports.page.sections.absent import LACKS
 from irl_gym.runs.experiment import Experiment
@@ -83,7 +83,7 @@ def test_a_stage_needs_only_parts_of_the_loop_and_takes_them_as_they_are(make):
 
 @pytest.mark.parametrize("show", [*SECTIONS, facts])
 def test_a_section_needs_only_parts_of_a_run_and_takes_them_as_they_are(show):
-    assert wrong(show, Contents, Run) == []
+    assert wrong(show, RunContents, Run) == []
 
 
 def test_what_is_said_of_an_absent_section_is_of_something_that_a_section_needs():

@@ -18,6 +18,7 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "doctor.py"
 
@@ -127,11 +128,11 @@ def test_one_episode_is_judged_and_told_to_tell_no_noise(doctor, tmp_path):
 
 
 def test_an_expert_with_noise_is_judged_by_what_its_episodes_show(runs):
-    assert "nothing-to-compare" not in diagnose_run(read_run(runs / "noisy")).names
+    assert "nothing-to-compare" not in supplied(diagnose_run, read_run(runs / "noisy")).names
 
 
 def test_an_unfinished_run_with_its_reward_is_diagnosed_as_a_finished_one(runs):
-    unfinished, finished = diagnose_unfinished(runs / "paper"), diagnose_run(read_run(runs / "paper"))
+    unfinished, finished = diagnose_unfinished(runs / "paper"), supplied(diagnose_run, read_run(runs / "paper"))
     assert unfinished.to_json()["findings"] == finished.to_json()["findings"]
     assert (
         unfinished.examined == f"{finished.examined} Not examined, of {len(CHECKS)} questions: 5, as no finished run judged it."

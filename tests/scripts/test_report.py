@@ -52,7 +52,7 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     ("name", "arguments", "place"),
     [
         ("report", ("--run", "run"), "irl_gym.reports.page.report.write_report"),
-        ("doctor", ("--run", "run"), "irl_gym.runs.diagnosed.diagnose_run"),
+        ("doctor", ("--run", "run"), "irl_gym.runs.diagnosed.diagnose"),
         ("compare", ("run", "run"), "irl_gym.reports.comparison.comparison_page.write_comparison"),
         ("doctor", ("--run", "run"), "irl_gym.runs.run.claims"),
     ],

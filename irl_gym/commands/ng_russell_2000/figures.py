@@ -16,11 +16,11 @@ from irl_gym.reports.drawing import BLUE, GREEN, GREY, INK, ORANGE, SERIES, arro
 from irl_gym.reports.plotting import save_figure
 from irl_gym.tables.layouts import grid_layout
 
-Outcome = Outcome1 | Outcome2 | Outcome3
+ExperimentOutcome = Outcome1 | Outcome2 | Outcome3
 """What the figures are drawn from."""
 
 
-def draw(outcome: Outcome, folder: Path) -> list[str]:
+def draw(outcome: ExperimentOutcome, folder: Path) -> list[str]:
     """Write the figures of one experiment as PNG into a folder; returns their names."""
     figures: dict[str, Figure] = {}
     if isinstance(outcome, Outcome1):

@@ -14,7 +14,7 @@ from gymnasium import spaces
 
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.imports.reading import Last, reading
-from irl_gym.demonstrations.imports.rows import Rows, say_dropped
+from irl_gym.demonstrations.imports.rows import LogColumns, say_dropped
 from irl_gym.demonstrations.imports.values import as_array, is_list, truths
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.mdp.episodes import Episode
@@ -66,7 +66,7 @@ def from_rollouts(
     following = getattr(buffer, "next_observations", None)
     rows = _worth_reading(starts, keep_single=following is not None or last in ("keep", "repeat"))
     steps = replace(steps, copy=steps.copy[rows], time=steps.time[rows])
-    made = Rows(
+    made = LogColumns(
         how, np.append(np.flatnonzero(starts[rows]), len(rows)), steps.name,
         *(steps.column(one) for one in (buffer.observations, buffer.actions, buffer.rewards)),
         next_observations=None if following is None else steps.column(following),

@@ -1,7 +1,8 @@
-"""Many episodes in each layout of arrays, as `Rows`. Axes: N episodes, T steps, n rows.
+"""Many episodes in each layout of arrays, as `LogColumns`. Axes: N episodes, T steps, n rows.
 
-`columns` are what a log has, by the names of the fields of `Rows`: observations, actions, and perhaps rewards, terminated,
-truncated, next_observations. Here the flags may also be one an episode, and observations one more than actions in each.
+`columns` are what a log has, by the names of the fields of `LogColumns`: observations, actions, and perhaps rewards,
+terminated, truncated, next_observations. Here the flags may also be one an episode, and observations one more than actions in
+each.
 """
 
 from collections.abc import Mapping
@@ -12,7 +13,7 @@ import numpy as np
 
 from irl_gym.demonstrations.imports.members import members
 from irl_gym.demonstrations.imports.reading import Reading
-from irl_gym.demonstrations.imports.rows import Rows
+from irl_gym.demonstrations.imports.rows import LogColumns
 from irl_gym.demonstrations.imports.values import Name, as_array, first_part, is_list, numbers, whole_numbers
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.mdp.episodes import Episode
@@ -45,7 +46,7 @@ def cut(how: Reading, columns: Mapping[str, Any], offsets: np.ndarray, name: Nam
                 raise InvalidDemonstrations(f"the {key} have shape {array.shape}: expected ({n},), one a step.")
             columns[key] = np.insert(array, offsets[1:], 0, axis=0)
         how, offsets, name = replace(how, last="row"), offsets + np.arange(N + 1), None
-    return Rows(how, offsets, name or _steps_of(offsets, how.noun), **columns).episodes()
+    return LogColumns(how, offsets, name or _steps_of(offsets, how.noun), **columns).episodes()
 
 
 def _steps_of(offsets: np.ndarray, noun: str) -> Name:

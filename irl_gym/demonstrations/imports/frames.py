@@ -22,7 +22,7 @@ from gymnasium import spaces
 from irl_gym.demonstrations.imports.cutting import FLAGS, offsets_at
 from irl_gym.demonstrations.imports.files import read_frame
 from irl_gym.demonstrations.imports.reading import Last, reading
-from irl_gym.demonstrations.imports.rows import Rows
+from irl_gym.demonstrations.imports.rows import LogColumns
 from irl_gym.demonstrations.imports.values import NO_WORDS, Name, numbers, shown, truths, whole_numbers
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.mdp.episodes import Episode
@@ -91,7 +91,7 @@ def from_frame(
     others = {key: table.role(roles[key]) for key in FLAGS} | {"rewards": table.role(reward)}
     seen = table.gathered(how.space, observation, "observation")
     following = None if next_observation is None else table.gathered(how.space, next_observation, "next observation")
-    return Rows(how, offsets, table.name, seen, table.columns[action], next_observations=following, **others).episodes()
+    return LogColumns(how, offsets, table.name, seen, table.columns[action], next_observations=following, **others).episodes()
 
 
 def _sorted(source: Any, roles: dict[str, str | None], observation: Any, next_observation: Any) -> tuple["_Table", np.ndarray]:

@@ -14,7 +14,7 @@ from gymnasium import spaces
 
 from irl_gym.checks import is_word
 from irl_gym.demonstrations.imports.reading import Last, Reading, reading
-from irl_gym.demonstrations.imports.rows import Rows, say_dropped
+from irl_gym.demonstrations.imports.rows import LogColumns, say_dropped
 from irl_gym.demonstrations.imports.values import truths
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.mdp.episodes import Episode
@@ -142,7 +142,7 @@ def _episode(steps: list[dict[str, Any]], first: int, how: Reading) -> Episode:
             )
         columns[column] = values
     actions = [step["action"] for step in steps]
-    (episode,) = Rows(
+    (episode,) = LogColumns(
         how, np.array([0, len(steps)]), name, [step["observation"] for step in steps],
         np.array(actions, dtype=object) if how.last == "row" else actions, **columns,
     ).cut()  # fmt: skip

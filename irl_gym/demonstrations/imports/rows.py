@@ -37,7 +37,7 @@ ENDINGS: dict[Last, Ending] = {"keep": "unseen", "drop": "dropped", "repeat": "s
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class LogColumns:
     """The columns of a log, unchecked."""
 
     how: Reading

@@ -96,10 +96,10 @@ class LambdaPath:
     @cached_property
     def changes(self) -> tuple[Change, ...]:
         """(k+1,) what changes at each breakpoint; the first, at price 0, is where the path begins."""
-        unit = self.r_max if self.margin_cap is None else min(self.r_max, self.margin_cap)
         return changes(
-            self.breakpoints, self.rewards, self.margins, self.total_margins, self.l1_norms, r_max=self.r_max, unit=unit
-        )
+            self.breakpoints, self.rewards, self.margins, self.total_margins, self.l1_norms, r_max=self.r_max,
+            margin_cap=self.margin_cap,
+        )  # fmt: skip
 
     def piece(self, lam: float) -> int | None:
         """The piece for a lambda; at a breakpoint the one before it, of larger norm; None above lambda_0.

@@ -5,7 +5,7 @@ piece has several optimal rewards, another choice may move other states, but not
 Axes: S states, A actions; a place is a state (n,), or a state and action (n, 2) for rewards R(s, a).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -53,47 +53,57 @@ class Change:
     """By how much the total margin changes; 0 at price 0, below 0 elsewhere."""
 
     def __str__(self) -> str:
-        """The change in a sentence."""
+        """The change in a sentence, places by their numbers."""
+        return self.sentence(None)
+
+    def sentence(self, name: Callable[..., str] | None) -> str:
+        """The change in a sentence.
+
+        Args:
+            name: what a state is called, `name(s)`, or a state and an action, `name(s, a)`; None for their numbers.
+        """
         if self.l1_norm_change == 0:
             state = f"||R||_1 is {self.l1_norm:.6g}, the total margin {self.total_margin:.6g}"
             return f"At price {self.price:.6g} the path begins: {state}."
-        parts = [text for text in self._parts() if text]
+        parts = [text for text in self._parts(name) if text]
         told = "; ".join(parts) + "; " if parts else ""
         return (
             f"At price {self.price:.6g} {told}||R||_1 falls by {-self.l1_norm_change:.6g} to {self.l1_norm:.6g}, the total "
             f"margin by {-self.total_margin_change:.6g} to {self.total_margin:.6g}."
         )
 
-    def _parts(self) -> Iterator[str]:
-        for name, said in (
+    def _parts(self, name: Callable[..., str] | None) -> Iterator[str]:
+        for which, said in (
             ("to_zero", "becomes 0"), ("from_zero", "leaves 0"), ("to_bound", "reaches a bound"),
             ("from_bound", "leaves a bound"), ("moved", "moves"),
         ):  # fmt: skip
-            yield _told("the reward", getattr(self, name), said)
-        for name, said in (("tied", "falls to 0"), ("untied", "rises from 0"), ("lowered", "falls"), ("raised", "rises")):
-            yield _told("the margin", getattr(self, name), said)
+            yield _told("the reward", getattr(self, which), said, name)
+        for which, said in (("tied", "falls to 0"), ("untied", "rises from 0"), ("lowered", "falls"), ("raised", "rises")):
+            yield _told("the margin", getattr(self, which), said, name)
 
     def to_json(self) -> dict[str, Any]:
-        """As json holds it, with the sentence."""
+        """As json holds it."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-        return plain | {"sentence": str(self)}
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
 
-def _told(what: str, places: np.ndarray, said: str) -> str:
+def _told(what: str, places: np.ndarray, said: str, name: Callable[..., str] | None) -> str:
     """`the reward of states 3, 7 becomes 0`, or nothing where no place does."""
     if not len(places):
         return ""
     kind = "state" if places.ndim == 1 else "step"
     if len(places) > NAMED:
         return f"{what} of {len(places)} {kind}s {said}"
+    if name is not None:
+        *others, last = (f"({name(*place)})" for place in places.reshape(len(places), -1).tolist())
+        return f"{what} of {', '.join(others)}{' and ' if others else ''}{last} {said}"
     names = ", ".join(str(place) if places.ndim == 1 else f"({place[0]}, {place[1]})" for place in places.tolist())
     return f"{what} of {kind}{'s' * (len(places) > 1)} {names} {said}"
 
 
 def changes(
     breakpoints: np.ndarray, rewards: np.ndarray, margins: np.ndarray, totals: np.ndarray, norms: np.ndarray, *, r_max: float,
-    unit: float,
+    margin_cap: float | None,
 ) -> tuple[Change, ...]:  # fmt: skip
     """One change for each of the k+1 breakpoints: the first is where the path begins, the last where R becomes 0.
 
@@ -104,8 +114,9 @@ def changes(
         totals: (k,) total margins.
         norms: (k,) ||R||_1.
         r_max: bound on |R|.
-        unit: R_max, or the cap on margins where that is smaller.
+        margin_cap: cap on margins; None where there is none.
     """
+    unit = r_max if margin_cap is None else min(r_max, margin_cap)
     R = np.concatenate([rewards[:1], rewards, np.zeros_like(rewards[:1])])
     flat = np.where(np.isnan(margins[:1]), np.nan, 0.0)
     M = np.concatenate([margins[:1], margins, flat])

@@ -24,7 +24,7 @@ from irl_gym.learners.linear_programs.programs import picking
 from irl_gym.programs.deadline import Deadline
 from irl_gym.programs.warm_lp import WarmLP
 
-Found = tuple[np.ndarray, np.ndarray, int]
+Ends = tuple[np.ndarray, np.ndarray, int]
 
 
 class RewardSet(ABC):
@@ -47,7 +47,7 @@ class RewardSet(ABC):
         """The set."""
 
     @abstractmethod
-    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Ends:
         """Least and largest reward, (S,) or (S, A), and how many linear programs it took."""
 
     def largest_margin(self, deadline: Deadline) -> float:
@@ -101,7 +101,7 @@ class StateRewards(RewardSet):
             np.concatenate([value, most_u]),
         )
 
-    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Ends:
         """Where the expert is not known the largest u, and the least of V(s) - gamma P_a(s) V over V and a."""
         k, n = self.opened.size, self.closed.size
         on_V = sp.vstack([self.here, sp.csr_array((k, self.n_states)), -self.each])
@@ -143,7 +143,7 @@ class StepRewards(RewardSet):
         low = self._pinned(-1.0) + np.where(self.counted, tau, 0.0)
         return Polytope(self.A, low, np.where(self.taken, self._pinned(1.0), np.inf), -value, value)
 
-    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Found:
+    def bounds(self, tau: float, workers: int, deadline: Deadline) -> Ends:
         """An action that the expert does not take can have any reward from -1 to what keeps it worse by tau."""
         least, most = extremes(self.polytope(tau), self.A, lowest=self.taken, workers=workers, deadline=deadline)
         low = np.where(self.taken, least, self._pinned(-1.0))

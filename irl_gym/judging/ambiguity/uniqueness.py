@@ -22,7 +22,7 @@ from irl_gym.judging.ambiguity.extremes import Polytope, extremes
 from irl_gym.judging.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.judging.ambiguity.priced_rewards import PricedRewards
 from irl_gym.judging.ambiguity.widths import served_actions
-from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.linear_programs.finite import FiniteLP, checked_finite
 from irl_gym.learners.linear_programs.programs import JUST_BELOW
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.deadline import Deadline
@@ -113,9 +113,7 @@ def optimal_face(
         DegenerateExpert: no reward has a margin.
         SolverTimeout, SolverFailed: no answer.
     """
-    learner = FiniteLP() if learner is None else learner
-    if not isinstance(learner, FiniteLP):
-        raise InvalidParameter(f"learner is a {type(learner).__name__}: expected a FiniteLP, whose program has the face.")
+    learner = FiniteLP() if learner is None else checked_finite(learner)
     tolerance = checked_number("tolerance", tolerance, "a price above 0, such as 1e-7", above=0)
     if learner.slack is not None:
         raise InvalidParameter(f"slack is {learner.slack!r}: expected None, where the rows of (4) are hard.")

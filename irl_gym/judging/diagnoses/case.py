@@ -17,8 +17,8 @@ from irl_gym.judging.metrics import Tie, ties_of, worst_tie
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.proofs.finite_proof import served
-from irl_gym.mdp.margins import Margins, best_margins, least_per_state, margins_of
-from irl_gym.mdp.optimality_rows import as_compared, compare
+from irl_gym.mdp.margins import JudgedRows, Margins, least_per_state, margins_under
+from irl_gym.mdp.optimality_rows import compare
 from irl_gym.mdp.planning.discounted import EPSILON
 from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.planning.howard import Optimum
@@ -29,45 +29,6 @@ from irl_gym.programs.status import Status
 
 SMALL = 2_000
 """Reachable states up to which programs are solved again, to say what another learner would find."""
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """The rows of (4), with what they are worth under R."""
-
-    states: np.ndarray
-    """(n,) rows of the table."""
-    actions: np.ndarray
-    """(n,) the action that the expert's is compared with."""
-    equal: np.ndarray
-    """(n,) the expert takes this action too."""
-    trivial: np.ndarray
-    """(n,) both actions have the same successors."""
-    margins: np.ndarray
-    """(n,) Q(s, pi) - Q(s, a); NaN without a reward."""
-    unsure: np.ndarray
-    """(n,) they are within this of the exact ones."""
-    none: np.ndarray
-    """(n,) a margin or a violation up to this is none."""
-    usable: np.ndarray
-    """(n,) rows that a reward of this kind can give a margin."""
-    errors: np.ndarray
-    """(n,) sampling errors of the margins; 0 on an exact table."""
-
-    @property
-    def violations(self) -> np.ndarray:
-        """(n,) by how much each row of (4) is violated."""
-        return np.where(self.equal, np.abs(self.margins), np.maximum(-self.margins, 0.0))
-
-    @property
-    def violated(self) -> np.ndarray:
-        """(n,) rows that are violated for certain."""
-        return self.violations - self.unsure > self.none
-
-    @property
-    def tied(self) -> np.ndarray:
-        """(n,) rows whose margin is none, and no violation."""
-        return np.abs(self.margins) <= self.none
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,11 +149,11 @@ class Case:
         return float(self.mdp.d0 @ self.true_optimum.error) + 64 * EPSILON * size
 
     @cached_property
-    def rows(self) -> Rows | None:
+    def rows(self) -> JudgedRows | None:
         """The rows of (4); None without a table or an expert."""
         return self.rows_at(None) if self.has_expert else None
 
-    def rows_at(self, gamma: float | None) -> Rows:
+    def rows_at(self, gamma: float | None) -> JudgedRows:
         """The rows of (4) for another discount, or for the table's own."""
         assert self.mdp is not None
         keep = self.states
@@ -201,16 +162,15 @@ class Case:
             part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
         nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
-        margins = Margins(nothing, nothing, nothing, nothing)
+        margins, either = Margins(nothing, nothing, nothing, nothing), c.equal
         if self.reward is not None:
-            found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
-            # What follows an unknown state is worth what acting best is, as in `optimality`.
-            taken = self.fully_known and not self.claims.get("errs", self.claims.get("slack") is not None)  # at its word
-            margins = margins_of(found, c) if taken else best_margins(found, c)
+            # As `certify`: what follows an unknown state, or an error, is worth what acting best is.
+            best = not self.fully_known or bool(self.claims.get("errs", self.claims.get("slack") is not None))
+            margins, either = margins_under(part, c, self.reward.of_rows(keep), best=best)[1], c.equal & (not best)
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
-        usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
-        return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
+        usable = ~c.equal & (~c.trivial | (not self.on_states))
+        return JudgedRows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, either, usable, errors)
 
     @property
     def _kept(self) -> np.ndarray:

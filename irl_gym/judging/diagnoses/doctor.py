@@ -15,16 +15,16 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.evidence import Evidence, missed, too_little
+from irl_gym.judging.diagnoses.evidence import EvidenceName, missed, too_little
 from irl_gym.judging.diagnoses.findings import NO_REWARD, counted
 from irl_gym.judging.diagnoses.findings import Diagnosis as Diagnosis
 from irl_gym.judging.diagnoses.findings import Finding as Finding
 from irl_gym.learners.base import Outcome
-from irl_gym.mdp.rewards import TabularReward, as_reward
+from irl_gym.mdp.rewards import TabularReward, as_reward, in_table
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.spaces.states import States
 
-CHECKS: Mapping[Callable[[Case], Finding | None], tuple[Evidence, ...]] = {
+CHECKS: Mapping[Callable[[Case], Finding | None], tuple[EvidenceName, ...]] = {
     nothing.lambda_above_lambda_0: ("certificate",),
     nothing.zero_weights: ("certificate",),
     nothing.nothing_to_compare: ("expert",),
@@ -108,21 +108,14 @@ def doctor(
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
         shaped,
-        weights=weights_of(reward),
+        weights=getattr(reward, "alpha", None),
     )
     return diagnose(case)
 
 
-def weights_of(reward: Any) -> np.ndarray | None:
-    """(K,) alpha of a reward that is linear in features; None of another."""
-    return reward.alpha if isinstance(reward, LinearReward) else None
-
-
 def as_tabular(reward: Any, mdp: TabularMDP, states: States | None) -> TabularReward:
     """A reward as one of the table's states or steps."""
-    if isinstance(reward, LinearReward):
-        reward = reward.tabular(mdp.n_states if states is None else states)
-    tabular = as_reward(reward)
+    tabular = in_table(reward, mdp.n_states if states is None else states)
     tabular.expected(mdp)  # checks the shape
     return tabular
 

@@ -5,11 +5,11 @@ from typing import Any, Literal
 
 from irl_gym.judging.diagnoses.case import SMALL, Case
 
-Evidence = Literal["certificate", "metrics", "expert", "reward", "true", "programs"]
+EvidenceName = Literal["certificate", "metrics", "expert", "reward", "true", "programs"]
 """The last four take a table, and "programs" one that is small enough to solve some again."""
 
 
-def lacking(case: Case, needs: Sequence[Evidence]) -> str | None:
+def lacking(case: Case, needs: Sequence[EvidenceName]) -> str | None:
     """Why the first of some evidence that a case has not is not there, in words; None where all is."""
     told = {
         "certificate": None if case.claims else "there is no learner's proof",
@@ -39,7 +39,7 @@ def too_little(case: Case) -> str | None:
     return "there is no table, and no certificate by which the expert is best under the reward, and not by a tie"
 
 
-def missed(case: Case, needs: Mapping[Any, Sequence[Evidence]]) -> str:
+def missed(case: Case, needs: Mapping[Any, Sequence[EvidenceName]]) -> str:
     """How many questions cannot be asked, and why, in a sentence; empty where all can.
 
     Args:

@@ -1,6 +1,6 @@
 """What the doctor says: findings, each a sentence and a mend, and the diagnosis that they make."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -11,6 +11,8 @@ from irl_gym.facts import counted as counted
 
 MOST_NAMED = 5
 """States that a sentence names; the others are counted."""
+WHERE = "{where}"
+"""Stands in a sentence for its states and actions: whoever tells it names them for its reader (`told_finding`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +22,7 @@ class Finding:
     name: str
     """Short and fixed, such as "lambda-above-lambda-0"."""
     sentence: str
-    """What is the case, with numbers."""
+    """What is the case, with numbers; `WHERE` in it stands for the states and actions."""
     mend: str
     """What to do about it."""
     states: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -43,7 +45,7 @@ class Finding:
         }
 
 
-Answer = Literal["healthy", "findings", "not examined"]
+Health = Literal["healthy", "findings", "not examined"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,7 @@ class Diagnosis:
     """Why too little could be looked at to call the reward healthy; None where enough was."""
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> Health:
         """What is wrong was found, or nothing is wrong, or that cannot be said."""
         return "findings" if self.findings else "healthy" if self.why is None else "not examined"
 
@@ -74,7 +76,9 @@ class Diagnosis:
 
     def __str__(self) -> str:
         """The diagnosis as a person reads it."""
-        told = [f"{number}. {one.sentence}\n   Mend: {one.mend}" for number, one in enumerate(self.findings, start=1)]
+        told = [
+            f"{number}. {told_finding(one.to_json())}\n   Mend: {one.mend}" for number, one in enumerate(self.findings, start=1)
+        ]
         return "\n".join([f"{told_answer(self.to_json())} {self.examined}".strip(), *told])
 
     def to_json(self) -> dict[str, Any]:
@@ -94,11 +98,22 @@ def told_answer(diagnosis: Mapping[str, Any]) -> str:
     return "Healthy." if diagnosis["answer"] == "healthy" else f"Not examined: {diagnosis['why']}."
 
 
-def named(states: np.ndarray, actions: np.ndarray | None = None) -> str:
-    """The first few states, or pairs of state and action, and how many more there are."""
-    told = [f"s={s}" for s in states] if actions is None else [f"s={s} a={a}" for s, a in zip(states, actions, strict=True)]
-    more = len(told) - MOST_NAMED
-    return ", ".join(told) if more <= 0 else f"{', '.join(told[:MOST_NAMED])} and {more:,} more"
+def row_of(state: int, action: int | None = None) -> str:
+    """A state, or a state and an action, by their numbers in the table."""
+    return f"s={state}" if action is None else f"s={state} a={action}"
+
+
+def told_finding(found: Mapping[str, Any], place: Callable[[int, int | None], str] = row_of) -> str:
+    """The sentence of a finding as json holds it, with its first few states and actions, and how many more there are.
+
+    Args:
+        found: the finding.
+        place: what a state is called, or a state and an action, such as `Run.place_name`.
+    """
+    states, actions = found["states"], found["actions"] or (None,) * len(found["states"])
+    told = [place(state, action) for state, action in zip(states[:MOST_NAMED], actions[:MOST_NAMED], strict=True)]
+    more = len(states) - MOST_NAMED
+    return found["sentence"].replace(WHERE, f"{', '.join(told)}{f' and {more:,} more' if more > 0 else ''}", 1)
 
 
 NO_REWARD = Diagnosis((), "", "the learner gives a policy, and no reward to examine")

@@ -4,7 +4,7 @@ import numpy as np
 
 from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.judging.diagnoses.mends import DEFAULTS, capped, on_steps
 from irl_gym.learners.base import Outcome
 
@@ -135,10 +135,11 @@ def constant_reward(case: Case) -> Finding | None:
         return None
     what = f"is {paid.flat[0]:.4g} in every reachable state" if same else "pays every action alike in every reachable state"
     ends = case.states[case.mdp.terminal[case.states]]
-    where = f"episodes end only where every action leads ({named(ends)})" if ends.size else "no state ends an episode"
+    where = f"episodes end only where every action leads ({WHERE})" if ends.size else "no state ends an episode"
     return Finding(
         "flat-reward",
         f"The reward {what}, and {where}: every policy collects the same, so nothing is preferred.",
         "FiniteLP() with its defaults, whose margins are above 0 wherever a reward can have any.",
+        ends,
         flags=DEFAULTS,
     )

@@ -57,7 +57,7 @@ def fell_short(case: Case) -> Finding | None:
 
 def _stronger(case: Case) -> tuple[str, ...]:
     """The flags of a stronger inner planner; none where it is exact already."""
-    if case.stats.get("inner") == "ValueIteration":
+    if case.stats.get("exact_planner"):
         return ()
     return ("--total-timesteps",) if case.mdp is None else ("--inner value-iteration",)
 

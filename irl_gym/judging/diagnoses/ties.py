@@ -4,9 +4,11 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.errors import DegenerateExpert
-from irl_gym.judging.diagnoses.case import Case, Rows
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.case import Case
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.judging.diagnoses.mends import DEFAULTS, Mend, breaking, on_steps
+from irl_gym.mdp.margins import JudgedRows
+from irl_gym.mdp.optimality import alike_told, unsettled_told, violated_told
 
 
 def violated(case: Case) -> Finding | None:
@@ -18,17 +20,19 @@ def violated(case: Case) -> Finding | None:
     if not which.size:
         return None
     which = which[np.argsort(-rows.violations[which], kind="stable")]
-    worst = float(rows.violations[which[0]])
-    more = f"in {{states}} another action is worth more, by at most {worst:.3g}: {{where}}"
-    told = f"The expert is not optimal under this reward: {more}."
+    told = violated_told(_count(rows, which), which.size, float(rows.violations[which[0]]))
+    told = f"The expert is not optimal under this reward: {told}: {WHERE}."
     return _found("expert-not-optimal", told, _obey(case), rows, which)
 
 
-def _found(name: str, told: str, mend: Mend, rows: Rows, which: np.ndarray) -> Finding:
-    """A finding about some rows (k,); its sentence has {states}, how many there are, and {where}, the first of them."""
-    states, actions = rows.states[which], rows.actions[which]
-    sentence = told.format(states=counted(np.unique(states).size), where=named(states, actions))
-    return Finding(name, sentence, mend[0], states, tuple(actions.tolist()), mend[1])
+def _count(rows: JudgedRows, which: np.ndarray) -> int:
+    """In how many states some rows (k,) are."""
+    return np.unique(rows.states[which]).size
+
+
+def _found(name: str, told: str, mend: Mend, rows: JudgedRows, which: np.ndarray) -> Finding:
+    """A finding about some rows (k,)."""
+    return Finding(name, told, mend[0], rows.states[which], tuple(rows.actions[which].tolist()), mend[1])
 
 
 def _obey(case: Case) -> Mend:
@@ -68,13 +72,13 @@ def same_successors(case: Case) -> Finding | None:
         return None
     paid = "but not, as counted, the same true reward" if case.counted else "but not the same true reward"
     harm = paid if case.true is not None else "which does no harm only if they also cost the same"
-    where = "where the expert's own leads, as far as the counts tell" if case.counted else "where the expert's own leads"
-    told = f"In {{states}} an action leads {where}, {harm}: {{where}}. No reward on states tells them apart."
+    alike = alike_told(_count(rows, which), estimated=case.counted).replace("in", "In", 1)
+    told = f"{alike}, {harm}: {WHERE}. No reward on states tells them apart."
     mend = 'reward_on="state-action"; more steps to count, where they do lead elsewhere.' if case.counted else None
     return _found("same-successors", told, (mend or 'reward_on="state-action".', on_steps(case)), rows, which)
 
 
-def _marginless(rows: Rows) -> np.ndarray:
+def _marginless(rows: JudgedRows) -> np.ndarray:
     """(k,) rows that a reward of this kind can move and that have no margin, without being violated."""
     return np.flatnonzero(rows.usable & rows.tied)
 
@@ -85,7 +89,8 @@ def avoidable_ties(case: Case) -> Finding | None:
     if rows is None or not which.size:
         return None
     though = "" if guessed else ", though some reward prefers it"
-    told = f"In {{states}} the reward ties the expert with another action{though}: {{where}}. An agent may take either."
+    states = counted(_count(rows, which))
+    told = f"In {states} the reward ties the expert with another action{though}: {WHERE}. An agent may take either."
     return _found("avoidable-ties", told, breaking(case, rows.states[which], rows.actions[which]), rows, which)
 
 
@@ -99,7 +104,8 @@ def unbreakable_ties(case: Case) -> Finding | None:
         kind = "reward on states"
         told = 'reward_on="state-action"; or give the expert as the (S, A) set of its optimal actions, if both are as good.'
         mend = told, on_steps(case)
-    told = f"In {{states}} no {kind} under which the expert is optimal everywhere prefers its action to another: {{where}}."
+    states = counted(_count(rows, which))
+    told = f"In {states} no {kind} under which the expert is optimal everywhere prefers its action to another: {WHERE}."
     return _found("unbreakable-ties", told, mend, rows, which)
 
 
@@ -109,16 +115,14 @@ def unsettled(case: Case) -> Finding | None:
     if rows is None or not (case.judges_states and case.speaks) or not which.size:
         return None
     which = which[np.argsort(rows.margins[which] - rows.errors[which], kind="stable")]
-    told = (
-        f"The table is counted, and in {{states}} the expert's margin over another action is within what the counts leave "
-        f"open, {rows.errors[which].min():.2g} to {rows.errors[which].max():.2g}, so that it may be noise: {{where}}."
-    )
+    left = f"{rows.errors[which].min():.2g} to {rows.errors[which].max():.2g}"
+    told = f"The table is counted: {unsettled_told(_count(rows, which))}; these errors are {left}: {WHERE}."
     more = "More steps to count (`Interaction(steps=...)`, `Enumeration(runs=...)`, episodes): four times as many halve it."
     mend = more, ("--table sample", "--steps")
     return _found("within-sampling-error", told, mend, rows, which)
 
 
-def _split(case: Case) -> tuple[Rows | None, Indices, Indices, bool]:
+def _split(case: Case) -> tuple[JudgedRows | None, Indices, Indices, bool]:
     """The rows of (4); those without a margin that another reward breaks; those that none does; is the split not known?"""
     rows, none = case.rows, np.zeros(0, dtype=np.int64)
     if rows is None or not (case.speaks and case.judges_states):

@@ -4,7 +4,7 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.judging.diagnoses.mends import Mend, breaking, on_steps
 from irl_gym.judging.diagnoses.unseen import entered
 from irl_gym.judging.metrics import policy_value, random_value
@@ -55,7 +55,7 @@ def poor_expert(case: Case) -> Finding | None:
     Q = case.true_optimum.Q
     loss = np.where(case.mdp.terminal | ~case.known, 0.0, Q.max(axis=1) - (shown * Q).sum(axis=1))
     states = _heaviest(occupancy(case.mdp, shown).sum(axis=1) * loss)
-    told = f"{earns} where {best:.4g} is possible and random actions earn {random:.4g}; it loses most in {named(states)}."
+    told = f"{earns} where {best:.4g} is possible and random actions earn {random:.4g}; it loses most in {WHERE}."
     return Finding("expert-suboptimal", told, mend, states, flags=flags)
 
 
@@ -155,7 +155,7 @@ def lossy_ties(case: Case) -> Finding | None:
     return Finding(
         "worst-tie",
         f"The reward allows too much: the worst policy that is greedy under it earns {told}. It loses most in "
-        f"{counted(states.size)}: {named(states, actions)}.",
+        f"{counted(states.size)}: {WHERE}.",
         mend,
         states,
         tuple(actions.tolist()),
@@ -170,7 +170,7 @@ def _mixed(lost: np.ndarray, policy: np.ndarray, told: str) -> Finding:
     return Finding(
         "expert-suboptimal",
         f"The actions that the expert mixes are not all as good: under the true reward the worst policy that is greedy under "
-        f"the learned one, and takes them, earns {told}. It loses most in {named(states, actions)}.",
+        f"the learned one, and takes them, earns {told}. It loses most in {WHERE}.",
         "Give the actions that it prefers: `most_frequent(empirical_policy(...))` for an expert that errs.",
         states,
         tuple(actions.tolist()),

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 
 from irl_gym._typing import ActionSets, StateMask
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
 
@@ -20,7 +20,7 @@ def unvisited(case: Case) -> Finding | None:
     return Finding(
         "unvisited-states",
         f"Nothing is known of the expert in {counted(unknown.size)}, {share:.0%} of those in which it can act: "
-        f"{named(unknown)}.{chosen.get(kept, '')}",
+        f"{WHERE}.{chosen.get(kept, '')}",
         "More episodes; more start_seeds, or starts elsewhere; or an expert with some noise (epsilon), that strays.",
         unknown,
         flags=("--episodes", "--epsilon"),
@@ -61,8 +61,7 @@ def strays(case: Case) -> Finding | None:
         flags = ("--rounds",)
     return Finding(
         "strays",
-        f"An agent that is greedy under the reward can reach {counted(beyond.size)} that the expert never enters{of}: "
-        f"{named(beyond)}.",
+        f"An agent that is greedy under the reward can reach {counted(beyond.size)} that the expert never enters{of}: {WHERE}.",
         mend,
         beyond,
         flags=flags,

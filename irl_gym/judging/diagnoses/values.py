@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.judging.diagnoses.findings import Finding, counted, named
+from irl_gym.judging.diagnoses.findings import WHERE, Finding, counted
 from irl_gym.mdp.margins import least_per_state
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.rewards import TabularReward
@@ -48,7 +48,7 @@ def _small(case: Case, under: str, vanished: np.ndarray, larger: float) -> Findi
     return Finding(
         "small-gamma",
         f"At gamma = {case.mdp.gamma:g} values vanish on the way: under {under} is below {VANISHED:g} of the largest |R| in "
-        f"{counted(states.size)}, {vanished.mean():.0%}: {named(states)}.",
+        f"{counted(states.size)}, {vanished.mean():.0%}: {WHERE}.",
         f"A larger gamma: at {larger:g}, with the same reward, it no longer is.",
         states,
         flags=(f"--gamma {larger:g}",),

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 
 from irl_gym._typing import Numbers, Sparse, Vector
 from irl_gym.judging.distances.coverage import Coverage, coverage_of, probabilities
-from irl_gym.judging.distances.payments import Payments
+from irl_gym.judging.distances.payments import StepPayments
 from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
@@ -32,11 +32,11 @@ REFINEMENTS = 3
 class Canonical(Protocol):
     """A choice of one reward for each set of equivalent ones."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) the canonical reward on the transitions of a coverage distribution."""
         ...
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """How far rounding can put a value off: a share of the largest reward that is read."""
         ...
 
@@ -45,11 +45,11 @@ class Canonical(Protocol):
 class AsGiven:
     """The reward as it is."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) R(s, a, s')."""
         return reward.at(coverage.states, coverage.actions, coverage.next_states)
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """0: nothing is computed."""
         return 0.0
 
@@ -74,7 +74,7 @@ class FreshDraws:
     actions: np.ndarray | None = None
     """(A,) D_A; None for uniform."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) C(R)(s, a, s')."""
         D_S = probabilities("states", self.states, (mdp.n_states,))
         D_A = probabilities("actions", self.actions, (mdp.n_actions,))
@@ -84,7 +84,7 @@ class FreshDraws:
         W = np.where(acting, mean + mdp.gamma * future, 0.0)
         return AsGiven().values(mdp, reward.shaped(W, mdp.gamma), coverage)
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """Every triple out of a state that acts is read."""
         return reward.precision * reward.largest(~mdp.terminal) / (1 - mdp.gamma)
 
@@ -107,7 +107,7 @@ class ModelDraws:
     actions: np.ndarray | None = None
     """(A,) D_A; None for uniform."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) C(R)(s, a, s')."""
         D_A = probabilities("actions", self.actions, (mdp.n_actions,))
         s, a, following = coverage.states, coverage.actions, coverage.next_states
@@ -127,7 +127,7 @@ class ModelDraws:
         more = beyond_s[s] + beyond_next[following] + (0 if both is None else both[s, following])
         return reward.at(s, a, following) + mdp.gamma * one_step[following] - one_step[s] - mdp.gamma * more
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """Triples out of terminal states are read too."""
         return reward.precision * reward.largest(np.ones(mdp.n_states, dtype=bool))
 
@@ -145,14 +145,14 @@ class ValueAdjustedLevelling:
     levelled: bool = True
     """Without levelling, C(R)(s, a, s') = R(s, a, s') + gamma V(s') - V(s): S'-redistribution changes it."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) C(R)(s, a, s')."""
         R = reward.expected(mdp)
         uniform = np.full(R.shape, 1 / mdp.n_actions)
         V = evaluate_policy(mdp, R, uniform if self.policy is None else self.policy)
         return _shaped_values(mdp, reward, R, V, coverage, self.levelled)
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """Possible transitions are read; without levelling covered ones too."""
         return _rounding(mdp, reward, coverage, self.levelled)
 
@@ -168,7 +168,7 @@ class MinimalNorm:
     levelled: bool = True
     """Without levelling, the mean square is that of R(s, a, s'), and S'-redistribution changes it."""
 
-    def values(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> Numbers:
+    def values(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> Numbers:
         """(n,) C(R)(s, a, s')."""
         R = reward.expected(mdp)
         every = coverage_of(mdp, None)
@@ -186,12 +186,12 @@ class MinimalNorm:
         Phi[~mdp.terminal] = _least_squares(sp.csr_array(system)[:, np.flatnonzero(~mdp.terminal)], right, weights)
         return _shaped_values(mdp, reward, R, Phi, coverage, self.levelled)
 
-    def rounding(self, mdp: TabularMDP, reward: Payments, coverage: Coverage) -> float:
+    def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """Possible transitions are read; without levelling covered ones too."""
         return _rounding(mdp, reward, coverage, self.levelled)
 
 
-def _rounding(mdp: TabularMDP, reward: Payments, coverage: Coverage, levelled: bool) -> float:
+def _rounding(mdp: TabularMDP, reward: StepPayments, coverage: Coverage, levelled: bool) -> float:
     """What rounding leaves of values of a policy, and of what is computed from them."""
     read = [coverage_of(mdp, None)] if levelled else [coverage_of(mdp, None), coverage]
     largest = max(float(np.abs(AsGiven().values(mdp, reward, which)).max()) for which in read)
@@ -199,7 +199,7 @@ def _rounding(mdp: TabularMDP, reward: Payments, coverage: Coverage, levelled: b
 
 
 def _shaped_values(
-    mdp: TabularMDP, reward: Payments, R: np.ndarray, potential: Vector, coverage: Coverage, levelled: bool
+    mdp: TabularMDP, reward: StepPayments, R: np.ndarray, potential: Vector, coverage: Coverage, levelled: bool
 ) -> Numbers:
     """The values of R + gamma Phi(s') - Phi(s), or of their mean over s'."""
     if not levelled:

@@ -19,7 +19,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp, entry_rows
 
 
 @dataclass(frozen=True, eq=False)
-class Payments:
+class StepPayments:
     """R(s, a, s') as a sum of three parts."""
 
     step: Matrix
@@ -36,9 +36,9 @@ class Payments:
         paid = self.step[states, actions] + self.arrival[next_states]
         return paid if self.full is None else paid + self.full[states, actions, next_states]
 
-    def shaped(self, potential: Vector, gamma: float) -> "Payments":
+    def shaped(self, potential: Vector, gamma: float) -> "StepPayments":
         """R(s, a, s') + gamma Phi(s') - Phi(s)."""
-        return Payments(self.step - potential[:, None], self.arrival + gamma * potential, self.full, self.precision)
+        return StepPayments(self.step - potential[:, None], self.arrival + gamma * potential, self.full, self.precision)
 
     def expected(self, mdp: TabularMDP) -> Matrix:
         """(S, A) the mean over successors; 0 in terminal states, which take no step."""
@@ -61,7 +61,7 @@ class Payments:
         return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
 
-def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments:
+def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> StepPayments:
     """Read a reward of a table: a TabularReward, or an array (S,) paid on arrival, (S, A) or (S, A, S).
 
     Raises:
@@ -80,7 +80,7 @@ def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> Payments
             f"{name} has shape {array.shape}: expected ({S},), ({S}, {A}) or ({S}, {A}, {S}), for the {S} states and {A} "
             "actions of the table. Is it another environment's?"
         )
-    return Payments(
+    return StepPayments(
         array if array.ndim == 2 else np.zeros((S, A)),
         array if array.ndim == 1 else np.zeros(S),
         array if array.ndim == 3 else None,

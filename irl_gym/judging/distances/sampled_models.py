@@ -18,7 +18,7 @@ from irl_gym.judging.distances.sampled import BLOCKS, ROWS, Payer, RewardCall, c
 from irl_gym.judging.distances.transitions import Transitions
 from irl_gym.mdp.tabular_mdp import check_discount
 
-Acting = Callable[[Any, np.random.Generator], np.ndarray]
+SampledActions = Callable[[Any, np.random.Generator], np.ndarray]
 """A policy: (observations, rng) -> (N, ...) actions."""
 
 
@@ -77,7 +77,7 @@ def sampled_starc(
     *,
     gamma: float,
     model: Model,
-    policy: Acting,
+    policy: SampledActions,
     horizon: int,
     replicates: int = 32,
     rng: np.random.Generator,
@@ -124,7 +124,7 @@ def sampled_starc(
 def _returns(
     rewards: tuple[Payer, ...],
     model: Model,
-    policy: Acting,
+    policy: SampledActions,
     here: np.ndarray,
     begin: np.ndarray | None,
     gamma: float,
@@ -146,7 +146,7 @@ def _returns(
     return total
 
 
-def _acted(policy: Acting, here: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _acted(policy: SampledActions, here: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(N, ...) what a policy does."""
     found = policy(here, rng)
     if isinstance(found, tuple) or np.shape(found)[:1] != (len(here),):

@@ -24,7 +24,7 @@ NOTHING = 1e-9
 MOST_PURGES = 50
 """Rounds after which rows that are in stay in, so that the series ends."""
 
-Part = Callable[[np.ndarray], tuple[float, float, np.ndarray]]
+PartProgram = Callable[[np.ndarray], tuple[float, float, np.ndarray]]
 """(n,) rows that are in, to the program's value, what every row that counts has to reach, and alpha (K,)."""
 
 
@@ -113,7 +113,7 @@ def breakable(rows: Rows, states: np.ndarray, wanted: np.ndarray, *, solving: So
     return strict_rows(states, wanted, serve)
 
 
-def _generate(d: np.ndarray, counted: np.ndarray, alpha: np.ndarray, solve_part: Part) -> tuple[float, np.ndarray]:
+def _generate(d: np.ndarray, counted: np.ndarray, alpha: np.ndarray, solve_part: PartProgram) -> tuple[float, np.ndarray]:
     """Value and weights of the last of a series of relaxations, each with the rows put in that the answer before violates most.
 
     Rows that are far from binding leave again, but for the last of many rounds, so that the programs stay small.

@@ -189,6 +189,17 @@ class FiniteLP:
             return task.lambda_0()
 
 
+def checked_finite(learner: Any) -> FiniteLP:
+    """A FiniteLP as it is, for who works on its program.
+
+    Raises:
+        InvalidParameter: another learner.
+    """
+    if not isinstance(learner, FiniteLP):
+        raise InvalidParameter(f"learner is a {type(learner).__name__}: expected a FiniteLP, whose program it is.")
+    return learner
+
+
 class _Task:
     """One fit: the reachable part of the MDP, the rows of (4), and the states that count."""
 

@@ -5,21 +5,23 @@ in one figure, as scores where the environments differ.
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 from irl_gym.errors import InvalidParameter
+from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging import measures
 from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.measures import Measure, explained, shown
 from irl_gym.judging.scores import REFERENCES, agent_of, called, others
 from irl_gym.judging.shares import judged
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.reports.comparison.compared_runs import ComparedRuns, lettered
 from irl_gym.reports.comparison.pooled import over_seeds
 from irl_gym.reports.comparison.ranked import learning, sentence
-from irl_gym.reports.comparison.shared_worlds import one_world, run_places, run_title
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.comparison.shared_worlds import run_title
 from irl_gym.reports.page.document import write_page
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.scene import Scene
@@ -29,8 +31,8 @@ from irl_gym.reports.page.sections.proof import finding
 from irl_gym.reports.page.sections.section import Section, specs
 from irl_gym.reports.page.sections.verdict import answer, how
 from irl_gym.runs.certificates import facts_in
-from irl_gym.runs.pooling import pools
 from irl_gym.runs.run import Run
+from irl_gym.runs.supply import supplied
 from irl_gym.written import counted, seconds, sentence_of
 
 SCRIPTS = ("theme.js", "figures.js")
@@ -51,58 +53,44 @@ def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
     """
     if not 2 <= len(runs) <= MOST_RUNS:
         raise InvalidParameter(f"runs has {len(runs)} of them: expected 2 to {MOST_RUNS} to put side by side.")
-    named = lettered(runs)
-    context, data = _page(named)
+    context, data = _page(lettered(runs))
     write_page(path, "compare.html", context, data, SCRIPTS)
 
 
-def lettered(runs: Sequence[Run]) -> dict[str, Run]:
-    """Runs by their letters."""
-    return {chr(ord("A") + i): run for i, run in enumerate(runs)}
-
-
-def _page(named: Mapping[str, Run]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _page(compared_runs: ComparedRuns) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the template shows, and the scripts."""
-    scenes = {letter: Contents(run).scene for letter, run in named.items()}
-    places, found = run_places(named), pools(named)
-    sections = [
-        _results(named),
-        over_seeds(found, places, same=one_world(named)),
-        learning(named),
-        _rewards(named, scenes),
-        _policies(scenes),
-        _differences(named),
-        _proofs(named),
-        _doctors(named),
-    ]
-    kept = [section for section in sections if section is not None]
-    facts = [(letter, f"{run_title(run.config, places[letter])} ({run.path.resolve().name})") for letter, run in named.items()]
-    facts += [(letter, run.caution) for letter, run in named.items() if run.caution is not None]
-    told = {run.whose: [letter for letter, one in named.items() if one.whose == run.whose] for run in named.values()}
+    kept = [section for show in SECTIONS if (section := supplied(show, compared_runs)) is not None]
+    runs, places = compared_runs.runs, compared_runs.places
+    facts = [(letter, f"{run_title(run.config, places[letter])} ({run.path.resolve().name})") for letter, run in runs.items()]
+    facts += [(letter, run.caution) for letter, run in runs.items() if run.caution is not None]
+    told = {run.whose: [letter for letter, one in runs.items() if one.whose == run.whose] for run in runs.values()}
     facts += [(", ".join(letters), whose) for whose, letters in told.items()]
-    context = {"title": f"{len(named)} runs side by side", "facts": facts, "sentence": sentence(named, found), "sections": kept}
+    said = supplied(sentence, compared_runs)
+    context = {"title": f"{len(runs)} runs side by side", "facts": facts, "sentence": said, "sections": kept}
     return context, {"figures": specs(kept), "slider": None, "episodes": {}}
 
 
-def _results(named: Mapping[str, Run]) -> Section:
+def results(
+    metrics: Mapping[str, Mapping[str, Any]], stages: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    recomputed: Mapping[str, bool], places: Mapping[str, str],
+) -> Section:  # fmt: skip
     """One row a number, one column a run."""
-    places = run_places(named)
-    told = shown(measures.POLICIES, [row for run in named.values() for row in run.metrics["policies"].values()])
+    told = shown(measures.POLICIES, [row for one in metrics.values() for row in one["policies"].values()])
     columns = [
         {
             "environment": places[letter],
-            **dict(_numbers(run.metrics, told, recomputed=run.recomputed)),
-            "time of all stages": _time(run),
+            **dict(_numbers(one, told, recomputed=recomputed[letter])),
+            "time of all stages": _time(stages[letter]),
         }
-        for letter, run in named.items()
+        for letter, one in metrics.items()
     ]
     keys = list(dict.fromkeys(key for column in columns for key in column))
     rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
     lead = [
         "Every number is under the true reward of its own environment.",
-        *_explained([run.metrics for run in named.values()]),
+        *_explained([*metrics.values()]),
     ]
-    return _table("results", "Results", " ".join(map(sentence_of, lead)), named, rows)
+    return _table("results", "Results", " ".join(map(sentence_of, lead)), metrics, rows)
 
 
 def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -114,14 +102,14 @@ def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
     return [one for one in each[0] if all(one in other for other in each)]
 
 
-def _table(name: str, title: str, lead: str, named: Mapping[str, Run], rows: list[list[str]]) -> Section:
-    shown = {"caption": title, "headings": ["", *(f"run {letter}" for letter in named)], "rows": rows}
+def _table(name: str, title: str, lead: str, letters: Iterable[str], rows: list[list[str]]) -> Section:
+    shown = {"caption": title, "headings": ["", *(f"run {letter}" for letter in letters)], "rows": rows}
     return Section(name, title, lead, (), "compare", shown)
 
 
-def _time(run: Run) -> str:
+def _time(stages: Mapping[str, Mapping[str, Any]]) -> str:
     """How long all stages took."""
-    return seconds(sum(record.get("seconds") or 0.0 for name, record in run.stages.items() if name != "report"))
+    return seconds(sum(record.get("seconds") or 0.0 for name, record in stages.items() if name != "report"))
 
 
 def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed: bool) -> Iterator[tuple[str, str]]:
@@ -151,16 +139,17 @@ def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed:
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
 
 
-def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Section | None:
+def rewards(
+    learned: Mapping[str, TabularReward | LinearReward | None], scenes: Mapping[str, Scene | None], places: Mapping[str, str]
+) -> Section | None:
     """The learned rewards, and once each environment's true one."""
     made: list[Panel] = []
-    places = run_places(named)
-    for letter, run in named.items():
+    for letter, reward in learned.items():
         scene = scenes[letter]
-        if run.learned is None:
+        if reward is None:
             continue
         if scene is None:
-            section = compared.weights(run.learned)
+            section = compared.weights(reward)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
             made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))
@@ -170,7 +159,7 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
     return Section("rewards", "Learned rewards", lead, made)
 
 
-def _policies(scenes: Mapping[str, Scene | None]) -> Section | None:
+def retrained(scenes: Mapping[str, Scene | None]) -> Section | None:
     """The retrained agents, with what deviates shaded."""
     made: list[Panel] = []
     for letter, scene in scenes.items():
@@ -184,9 +173,9 @@ def _policies(scenes: Mapping[str, Scene | None]) -> Section | None:
     return Section("policies", "Retrained agents", "What each agent does; shaded is where it deviates from its expert.", made)
 
 
-def _differences(named: Mapping[str, Run]) -> Section:
+def differences(configs: Mapping[str, Mapping[str, Any]]) -> Section:
     """What differs between the configurations."""
-    flat = [dict(_leaves(run.config)) for run in named.values()]
+    flat = [dict(_leaves(config)) for config in configs.values()]
     keys = _entries(flat)
     rows = [[key, *(_entry(one, key) for one in flat)] for key in keys if not _alike(key, flat)]
     if not rows:
@@ -195,7 +184,7 @@ def _differences(named: Mapping[str, Run]) -> Section:
         f"{counted(len(rows), 'entry differs', 'entries differ')}; the other {len(keys) - len(rows)} are the same in all runs"
     )
     lead = f"Of the configuration {told}."
-    return _table("differences", "What differs", lead, named, rows)
+    return _table("differences", "What differs", lead, configs, rows)
 
 
 def _entries(flat: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -225,31 +214,40 @@ def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield from _leaves(value, f"{prefix}.{key}" if prefix else str(key))
 
 
-def _proofs(named: Mapping[str, Run]) -> Section:
+def proofs(certificates: Mapping[str, Mapping[str, Any]], recomputed: Mapping[str, bool]) -> Section:
     """What each run's reward says of its expert, and what its learner proves."""
     columns = [
         {one.label: one.sentence for one in of_reward}
         | {f"{one.label}, as its learner recorded": one.sentence for one in of_program}
-        for of_reward, of_program in (facts_in(run.certificate) for run in named.values())
+        for of_reward, of_program in map(facts_in, certificates.values())
     ]
     labels = dict.fromkeys(label for column in columns for label in column)
     rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
-    recorded = ", ".join(letter for letter, run in named.items() if not run.recomputed)
+    recorded = ", ".join(letter for letter, whether in recomputed.items() if not whether)
     lead = "What each run's reward says of its expert, and by the run's own record what its learner proves of its program."
     lead += f" Of {recorded} all of it is the record." if recorded else ""
-    return _table("certificate", "Certificates", lead, named, rows)
+    return _table("certificate", "Certificates", lead, certificates, rows)
 
 
-def _doctors(named: Mapping[str, Run]) -> Section:
+def doctors(
+    diagnoses: Mapping[str, Mapping[str, Any] | None], configs: Mapping[str, Mapping[str, Any]],
+    place_names: Mapping[str, Callable[[int, int | None], str]],
+) -> Section:  # fmt: skip
     """What the doctor says of each run."""
     findings = []
     answers: dict[str, list[str]] = {}
-    for letter, run in named.items():
-        said = told_answer(run.diagnosis) if run.diagnosis else "Not looked at, by the earlier version of irl_gym that made it."
+    for letter, diagnosis in diagnoses.items():
+        said = told_answer(diagnosis) if diagnosis else "Not looked at, by the earlier version of irl_gym that made it."
         answers.setdefault(said, []).append(letter)
-        for one in run.diagnosis["findings"] if run.diagnosis else ():
-            told = finding(one, run.worded, given=run.config.get("dataset") is not None)
+        for one in diagnosis["findings"] if diagnosis else ():
+            told = finding(one, place_names[letter], given=configs[letter].get("dataset") is not None)
             findings.append({**told, "name": f"run {letter}: {told['name']}"})
     lead = "What is to be said against each reward, and what to do about it. " if findings else ""
     lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())
     return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})
+
+
+SECTIONS: tuple[Callable[..., Section | None], ...] = (
+    results, over_seeds, learning, rewards, retrained, differences, proofs, doctors,
+)  # fmt: skip
+"""In order: each is shown where there is something to show."""

@@ -15,28 +15,28 @@ TRIMMED = 4
 """Seeds from which on an interquartile mean leaves some out."""
 
 
-def over_seeds(found: Sequence[Pool], places: Mapping[str, str], *, same: bool) -> Section | None:
+def over_seeds(pools: Sequence[Pool], places: Mapping[str, str], same_world: bool) -> Section | None:
     """The section; None where no two runs differ in their seed alone.
 
     Args:
-        found: the pools.
+        pools: runs that differ in their seed alone.
         places: what the environment of each run is called.
-        same: are all runs of one environment, so that their values can be drawn in one figure?
+        same_world: are all runs of one environment, so that their values can be drawn in one figure?
     """
-    if not found:
+    if not pools:
         return None
     lead = (
         "Runs that differ in their seed alone, taken together: interquartile means with 95 % intervals, which "
         "resist outliers (Agarwal et al. 2021). Seeds that agree are too few to say how surely, and have no interval."
     )
-    if min(len(pool.runs) for pool in found) < TRIMMED:
+    if min(len(pool.runs) for pool in pools) < TRIMMED:
         lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few is wide."
-    columns = [_column(pool, places) for pool in found]
+    columns = [_column(pool, places) for pool in pools]
     keys = dict.fromkeys(key for column in columns for key in column)
     rows = [[key, *(column.get(key, "not there") for column in columns)] for key in keys]
-    shown = {"caption": "Over seeds", "headings": ["", *map(called, found)], "rows": rows}
-    lead += "".join(f" {_together(several, score)}" for several, score in over_environments(found))
-    drawn = [pool for pool in found if pool.curve is not None] if same else []
+    shown = {"caption": "Over seeds", "headings": ["", *map(called, pools)], "rows": rows}
+    lead += "".join(f" {_together(several, score)}" for several, score in over_environments(pools))
+    drawn = [pool for pool in pools if pool.curve is not None] if same_world else []
     return Section("seeds", "Over seeds", lead, [_curves(drawn)] if drawn else [], "compare", shown)
 
 
@@ -114,7 +114,7 @@ def _curves(drawn: Sequence[Pool]) -> Panel:
     """The learning curves of pools that have one."""
     found = {called(pool): pool.curve for pool in drawn if pool.curve is not None}
     series = {name: (steps, values[:, 0], (values[:, 1], values[:, 2])) for name, (steps, values) in found.items()}
-    levels = levels_of({called(pool): pool.runs for pool in drawn})
+    levels = levels_of({called(pool): pool.policies_of_runs for pool in drawn})
     ends = "; ".join(f"{name} end at {number(values[-1])}" for name, (_, values, _) in series.items())
     caption = f"Interquartile means with their 95 % intervals (shaded): {ends}; {levels_told(levels)}."
     return Panel("seed-curves", "Discounted value over seeds", caption, curves(series, levels, "discounted value"), height=400)

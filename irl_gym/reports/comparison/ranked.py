@@ -9,64 +9,63 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.judging.curves import Curve
 from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, score_of
 from irl_gym.reports.comparison.pooled import averaged, returned, spoken
-from irl_gym.reports.comparison.shared_worlds import agree, levels_of, levels_told, one_scale, one_world, worth
+from irl_gym.reports.comparison.shared_worlds import PolicyRows, agree, levels_of, levels_told, worth
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.sections.section import Section
-from irl_gym.reports.page.sections.training import curves, usual_levels
+from irl_gym.reports.page.sections.training import curves as drawn
+from irl_gym.reports.page.sections.training import usual_levels
 from irl_gym.runs.pooling import Pool
-from irl_gym.runs.run import Run
 from irl_gym.written import number, sentence_of
 
 TITLE = "Learning curves"
 
 
-def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
+def sentence(policies: Mapping[str, PolicyRows], pools: Sequence[Pool], same_world: bool, same_scale: bool) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
-    who = "retrained agent" if {agent_of(run.metrics["policies"]) for run in named.values()} == {RETRAINED} else "agent"
-    scores = {letter: _agent(run)["score"] for letter, run in named.items()}
+    who = "retrained agent" if {agent_of(rows) for rows in policies.values()} == {RETRAINED} else "agent"
+    scores = {letter: _agent(rows)["score"] for letter, rows in policies.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
         return "None of these runs has a score; each run's own page says why."
-    if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
-        expert, (pool,) = "the expert" if one_scale(named) else "the own expert of each", found
+    if len(pools) == 1 and len(pools[0].runs) == len(policies) and pools[0].score is not None:
+        expert, (pool,) = "the expert" if same_scale else "the own expert of each", pools
         means = f"a score of {spoken(pool.score)} and a {returned(pool)}, each the {averaged(pool)} with its 95 % interval"
-        return f"Over {len(named)} seeds the {who}s have {means}. By score random actions are 0, {expert} is 1."
-    if not one_scale(named):
-        each = "; ".join(f"run {letter} {_earned(run)} ({_ends({letter: run})})" for letter, run in named.items())
+        return f"Over {len(policies)} seeds the {who}s have {means}. By score random actions are 0, {expert} is 1."
+    if not same_scale:
+        each = "; ".join(f"run {letter} {_earned(rows)} ({_ends({letter: rows})})" for letter, rows in policies.items())
         return (
-            f"Scores of the {who}s: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
-            "score says how near each agent comes to its own expert, not which run is better."
+            f"Scores of the {who}s: {each}. By score random actions are 0, the expert is 1. "
+            f"{_unlike(policies, same_world)}, so a score says how near each agent comes to its own expert, not "
+            "which run is better."
         )
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
-    scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(named)}."
+    scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(policies)}."
     if score_of(known[best]) == score_of(known[worst]):
-        paid = _spread([_agent(run)["mean_return"] for run in named.values()])
+        paid = _spread([_agent(rows)["mean_return"] for rows in policies.values()])
         return f"The {who}s have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
-        f"The {who} of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
-        f"{_earned(named[worst])}.{_otherwise(named, best)} {scale}"
+        f"The {who} of run {best} has the best score, {_earned(policies[best])}; that of run {worst} the worst, "
+        f"{_earned(policies[worst])}.{_otherwise(policies, best)} {scale}"
     )
 
 
-def _agent(run: Run) -> Mapping[str, Any]:
+def _agent(rows: PolicyRows) -> Mapping[str, Any]:
     """The row of the policy that is spoken of."""
-    policies = run.metrics["policies"]
-    return policies[agent_of(policies)]
+    return rows[agent_of(rows)]
 
 
-def _earned(run: Run) -> str:
+def _earned(rows: PolicyRows) -> str:
     """A score with its mean return."""
-    row = _agent(run)
+    row = _agent(rows)
     return f"{score_of(row['score'])} with mean return {number(row['mean_return'])}"
 
 
-def _ends(named: Mapping[str, Run]) -> str:
+def _ends(policies: Mapping[str, PolicyRows]) -> str:
     """What random actions and the expert return."""
-    random, expert = (
-        _spread([run.metrics["policies"][name]["mean_return"] for run in named.values()]) for name in (RANDOM, EXPERT)
-    )
+    random, expert = (_spread([rows[name]["mean_return"] for rows in policies.values()]) for name in (RANDOM, EXPERT))
     return f"random actions have {random}, the expert {expert}"
 
 
@@ -75,46 +74,48 @@ def _spread(found: Sequence[float]) -> str:
     return " to ".join(dict.fromkeys(map(number, (min(found), max(found)))))
 
 
-def _otherwise(named: Mapping[str, Run], best: str) -> str:
+def _otherwise(policies: Mapping[str, PolicyRows], best: str) -> str:
     """Which run has the highest mean return, if that is not the one with the best score."""
-    returns = {letter: _agent(run)["mean_return"] for letter, run in named.items()}
+    returns = {letter: _agent(rows)["mean_return"] for letter, rows in policies.items()}
     most = max(returns, key=lambda one: returns[one])
     return "" if returns[most] == returns[best] else f" The highest mean return is that of run {most}, {number(returns[most])}."
 
 
-def _unlike(named: Mapping[str, Run]) -> str:
+def _unlike(policies: Mapping[str, PolicyRows], same_world: bool) -> str:
     """Why scores are not on one scale."""
-    if not one_world(named):
+    if not same_world:
         return "The environments differ"
-    apart = "random actions are" if agree(worth(named, EXPERT)) else "the experts are"
+    apart = "random actions are" if agree(worth(policies, EXPERT)) else "the experts are"
     return f"In these runs {apart} not worth the same"
 
 
-def learning(named: Mapping[str, Run]) -> Section:
+def learning(curves: Mapping[str, Curve], policies: Mapping[str, PolicyRows], same_world: bool) -> Section:
     """All learning curves in one figure."""
-    trained = {letter: run for letter, run in named.items() if len(run.curve.steps)}
+    trained = {letter: one for letter, one in curves.items() if len(one.steps)}
     if not trained:
         return Section("learning", TITLE, "No agent was trained step by step.")
-    if one_world(named):
-        series = {f"run {letter}": (run.curve.steps, run.curve.value, None) for letter, run in trained.items()}
-        levels = levels_of({f"run {letter}": {letter: run} for letter, run in trained.items()})
+    if same_world:
+        series = {f"run {letter}": (one.steps, one.value, None) for letter, one in trained.items()}
+        levels = levels_of({f"run {letter}": {letter: policies[letter]} for letter in trained})
         what, told = "discounted value from the start", levels_told(levels)
     else:
-        series = {f"run {letter}": curve for letter, run in trained.items() if (curve := _scores(run)) is not None}
+        series = {
+            f"run {letter}": found for letter, one in trained.items() if (found := _scores(one, policies[letter])) is not None
+        }
         levels, what, told = [*usual_levels(1.0, 0.0)], "score", "random actions are 0, the expert is 1"
     if not series:
         return Section("learning", TITLE, "No run has a score to draw.")
     ends = "; ".join(f"{name} ends at {number(values[-1])}" for name, (_, values, _) in series.items())
-    panel = Panel("curves", what.capitalize(), sentence_of(f"{ends}; {told}"), curves(series, levels, what), height=400)
-    left = [letter for letter in named if f"run {letter}" not in series]
+    panel = Panel("curves", what.capitalize(), sentence_of(f"{ends}; {told}"), drawn(series, levels, what), height=400)
+    left = [letter for letter in curves if f"run {letter}" not in series]
     lead = "What each agent earned under the true reward as it trained."
     lead += f" Without a curve, as nobody was trained step by step, or without a score: {', '.join(left)}." if left else ""
     return Section("learning", TITLE, lead, [panel])
 
 
-def _scores(run: Run) -> tuple[np.ndarray, np.ndarray, None] | None:
+def _scores(curve: Curve, rows: PolicyRows) -> tuple[np.ndarray, np.ndarray, None] | None:
     """A learning curve in scores; None where the expert is no better than random actions."""
-    low, high = (run.metrics["policies"][policy]["value"] for policy in (RANDOM, EXPERT))
+    low, high = (rows[policy]["value"] for policy in (RANDOM, EXPERT))
     if low is None or high is None or not high > low:
         return None
-    return run.curve.steps, (run.curve.value - low) / (high - low), None
+    return curve.steps, (curve.value - low) / (high - low), None

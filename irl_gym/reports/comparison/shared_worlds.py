@@ -11,12 +11,12 @@ import numpy as np
 
 from irl_gym.intervals import interquartile_mean
 from irl_gym.judging.scores import REFERENCES
-from irl_gym.reports.page.report import page_title
 from irl_gym.reports.page.sections.asked import written
 from irl_gym.reports.page.sections.training import COLOURS, Level, stroke, usual_levels
 from irl_gym.runs.pooling import without_seeds
-from irl_gym.runs.run import Run
 
+PolicyRows = Mapping[str, Any]
+"""What metrics.json says of each policy of a run, by its name."""
 WORLD = ("gamma", "start_seeds", "reveal", "bins", "samples", "table")
 """Entries of a configuration that make another world of an environment."""
 SHORT = 20
@@ -25,26 +25,25 @@ SAME = 1e-6
 """Values whose difference is below this share of the largest are the same: planners stop before that."""
 
 
-def run_places(named: Mapping[str, Run]) -> dict[str, str]:
+def run_places(titles: Mapping[str, str], configs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """What the environment of each run is called: its id, with short arguments, and whatever runs of one id differ in."""
     short = {
-        key for run in named.values() for key, one in (run.config.get("env_kwargs") or {}).items() if len(written(one)) <= SHORT
+        key
+        for config in configs.values()
+        for key, one in (config.get("env_kwargs") or {}).items()
+        if len(written(one)) <= SHORT
     }
-    given = {letter: dict(_given(run.config)) for letter, run in named.items()}
+    given = {letter: dict(_given(config)) for letter, config in configs.items()}
     told = {}
-    for letter, run in named.items():
-        same = [
-            given[other]
-            for other, one in named.items()
-            if page_title(one.env_id, one.config) == page_title(run.env_id, run.config)
-        ]
+    for letter, title in titles.items():
+        same = [given[other] for other, one in titles.items() if one == title]
         keys = [
             key
             for key in dict.fromkeys(key for one in same for key in one)
             if key in short or any(one.get(key) != same[0].get(key) for one in same)
         ]
         differing = ", ".join(f"{key}={written(given[letter][key])}" for key in keys if key in given[letter])
-        told[letter] = page_title(run.env_id, run.config) + (f" ({differing or 'no arguments'})" if keys else "")
+        told[letter] = title + (f" ({differing or 'no arguments'})" if keys else "")
     return told
 
 
@@ -61,9 +60,9 @@ def run_title(config: Mapping[str, Any], place: str) -> str:
     return f"{place}, {learner}, seed {config.get('seed')}"
 
 
-def one_world(named: Mapping[str, Run]) -> bool:
+def one_world(titles: Mapping[str, str], configs: Mapping[str, Mapping[str, Any]]) -> bool:
     """Are all runs of the same environment, and is the same made of it, so that their values can be compared?"""
-    return len({(page_title(run.env_id, run.config), _world(run.config)) for run in named.values()}) == 1
+    return len({(title, _world(configs[letter])) for letter, title in titles.items()}) == 1
 
 
 def _world(config: Mapping[str, Any]) -> str:
@@ -77,9 +76,9 @@ def _dataset(config: Mapping[str, Any]) -> tuple[str, ...]:
     return () if config.get("env_id") is not None else ("dataset", "dataset_root")
 
 
-def worth(named: Mapping[str, Run], policy: str) -> dict[str, float | None]:
+def worth(policies: Mapping[str, PolicyRows], policy: str) -> dict[str, float | None]:
     """What a policy, such as expert or random, is worth in each run; None where that is not known."""
-    return {letter: run.metrics["policies"][policy]["value"] for letter, run in named.items()}
+    return {letter: rows[policy]["value"] for letter, rows in policies.items()}
 
 
 def agree(values: Mapping[str, float | None]) -> bool:
@@ -91,19 +90,19 @@ def agree(values: Mapping[str, float | None]) -> bool:
     return bool(np.ptp(found) <= SAME * np.abs(found).max(initial=0.0))
 
 
-def one_scale(named: Mapping[str, Run]) -> bool:
-    """Is a score of one run as much as the same score of another?"""
-    return one_world(named) and all(agree(worth(named, policy)) for policy in REFERENCES)
+def one_scale(policies: Mapping[str, PolicyRows]) -> bool:
+    """Is a score of one run as much as the same score of another in this world?"""
+    return all(agree(worth(policies, policy)) for policy in REFERENCES)
 
 
-def levels_of(drawn: Mapping[str, Mapping[str, Run]]) -> list[Level]:
+def levels_of(drawn: Mapping[str, Mapping[str, PolicyRows]]) -> list[Level]:
     """The levels in a figure of values: one where all runs agree, else one for each curve, in its colour.
 
     Args:
-        drawn: the runs of each curve, one or the seeds of a pool, by its name and in the order in which they are drawn.
+        drawn: the policies of the runs of each curve, one or the seeds of a pool, by its name and in the order of drawing.
     """
     made: list[Level] = []
-    every = {letter: run for runs in drawn.values() for letter, run in runs.items()}
+    every = {letter: rows for runs in drawn.values() for letter, rows in runs.items()}
     for usual in usual_levels(None, None):
         values = worth(every, usual.name)
         if agree(values):

@@ -15,7 +15,7 @@ from irl_gym.runs.run import Run
 
 
 @dataclass(frozen=True, eq=False)
-class Contents:
+class RunContents:
     """Supplies sections (`irl_gym.runs.supply`)."""
 
     run: Run
@@ -32,9 +32,9 @@ class Contents:
         return Scene(run.table, learned, run.expert, run.agent, run.actions, run.state_name, run.grid, by_episodes)
 
     @property
-    def worded(self) -> Callable[[str], str]:
-        """Names the states and actions in a sentence."""
-        return self.run.worded
+    def place_name(self) -> Callable[[int, int | None], str]:
+        """What a state is called, or a state and an action."""
+        return self.run.place_name
 
     @property
     def given(self) -> bool:

@@ -19,7 +19,7 @@ from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
 from irl_gym.mdp.rewards import plain_json
 from irl_gym.runs.experiment import Experiment
-from irl_gym.runs.identity import AGAIN
+from irl_gym.runs.identity import NEW_FOLDER
 from irl_gym.tables.counted.counting import Counting, Interaction
 from irl_gym.tables.enumeration.table import Enumeration
 
@@ -83,7 +83,7 @@ def python_lines(config: Mapping[str, Any]) -> str:
         imports.insert(0, "import numpy as np")
     return "\n".join(
         ["from irl_gym import Experiment, recover_and_retrain", *imports, "", "asked = Experiment(", *told, ")",
-         f"report = recover_and_retrain(asked, {AGAIN!r})"]
+         f"report = recover_and_retrain(asked, {NEW_FOLDER!r})"]
     )  # fmt: skip
 
 

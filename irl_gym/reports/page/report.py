@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.document import write_page
 from irl_gym.reports.page.sections import compared, episodes, slider, training
 from irl_gym.reports.page.sections.absent import absent
@@ -34,11 +34,11 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         run: what a run left.
         path: of the file.
     """
-    sections = list(sections_of(run))
+    sections = list(sections_of(RunContents(run), run))
     context = {
         "title": page_title(run.env_id, run.config),
         "facts": supplied(facts, run),
-        "verdict": verdict(run.metrics, recomputed=run.recomputed),
+        "verdict": supplied(verdict, run),
         "sections": sections,
     }
     data: dict[str, Any] = {"figures": specs(sections), "slider": None, "episodes": {}}
@@ -47,12 +47,15 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
     write_page(path, "report.html", context, data, SCRIPTS)
 
 
-def sections_of(run: Run) -> Iterator[Section]:
-    """The sections of a run's page, or in place of one why it is absent."""
-    contents = Contents(run)
+def sections_of(*sources: Any) -> Iterator[Section]:
+    """The sections of a page, or in place of one why it is absent.
+
+    Args:
+        sources: who supplies what they need, such as a run's contents and the run.
+    """
     for show in SECTIONS:
-        need = missing(show, contents, run)
-        section = supplied(show, contents, run) if need is None else absent(need, run.stages)
+        need = missing(show, *sources)
+        section = supplied(show, *sources) if need is None else supplied(absent, *sources, need=need)
         if section is not None:
             yield section
 
@@ -109,4 +112,4 @@ SECTIONS: tuple[Callable[..., Section], ...] = (
     asked,
     reproduce,
 )
-"""In order: each is shown where what it needs is there (`Contents`, then the run's own fields)."""
+"""In order: each is shown where what it needs is there (`RunContents`, then the run's own fields)."""

@@ -127,6 +127,10 @@ class Scene:
         ended = " (ended)" if row in self._copies or self.mdp.terminal[row] else ""
         return state_called(self.called(row)) + ended
 
+    def place_name(self, row: int, action: int | None = None) -> str:
+        """What a state is called, or a state and an action."""
+        return self.name(row) if action is None else f"{self.name(row)}; {self.actions[action]}"
+
     @cached_property
     def _copies(self) -> frozenset[int]:
         return frozenset(self.table.states.terminal_copies.values())

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.judging.diagnoses.plain_words import named_in
 from irl_gym.tables.layouts import GridLayout
 
-AGAIN = "delete it, and its stage is run again"
+MADE_AGAIN = "delete it, and its stage is run again"
 WIDTHS = ("low", "high", "width")
 
 
@@ -33,17 +32,17 @@ def strangers(
         yield f"environment.json names {len(actions)} actions, but the table has {shape[1]}; delete it, and it is written again"
     for name, found in {**rewards, **policies}.items():
         if found.shape not in (shape, shape[:1]):
-            yield f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; {AGAIN}"
+            yield f"{name} has shape {found.shape}, but the table asks for ({shape[0]},) or {shape}; {MADE_AGAIN}"
     for name, policy in policies.items():
         if policy.ndim == 1 and policy.max(initial=0) >= shape[1]:
-            yield f"{name} has action {policy.max()} of {shape[1]}; {AGAIN}"
+            yield f"{name} has action {policy.max()} of {shape[1]}; {MADE_AGAIN}"
     if grid is not None and (grid.n_cells > shape[0] or len(grid.directions) != shape[1]):
         cells = f"{grid.n_cells} cells and {len(grid.directions)} actions"
-        yield f"grid.json has {cells} for a table of {shape[0]} states and {shape[1]} actions; {AGAIN}"
-    named = [pair for one in (diagnosis or {}).get("findings", ()) for pair in named_in(one["sentence"])]
-    beyond = [pair for pair in named if pair[0] >= shape[0] or (pair[1] or 0) >= shape[1]]
-    if beyond:
-        yield f"diagnosis.json speaks of s={beyond[0][0]}, but the table has {shape[0]} states; {AGAIN}"
+        yield f"grid.json has {cells} for a table of {shape[0]} states and {shape[1]} actions; {MADE_AGAIN}"
+    for found in (diagnosis or {}).get("findings", ()):
+        for name, n in (("states", shape[0]), ("actions", shape[1])):
+            if (most := max(found[name], default=0)) >= n:
+                yield f"diagnosis.json has {most} among the {name} of {found['name']!r:.60}, of {n} in the table; {MADE_AGAIN}"
 
 
 def left_open(
@@ -54,25 +53,26 @@ def left_open(
     Args:
         shape: S and A of the table.
         widths: arrays (S,) or (S, A) by name.
-        path: of lambda; arrays by name, and changes, a list.
+        path: of lambda; arrays by name.
     """
     if widths is not None:
         kinds = [np.asarray(widths.get(name, ())) for name in WIDTHS]
         odd = [one.shape for one in kinds if one.shape != kinds[0].shape or one.dtype.kind != "f" or np.isinf(one).any()]
         if odd or kinds[0].shape not in (shape, shape[:1]):
-            yield f"ambiguity.npz has widths of shape {(odd or [kinds[0].shape])[0]} for {shape[0]} states; {AGAIN}"
+            yield f"ambiguity.npz has widths of shape {(odd or [kinds[0].shape])[0]} for {shape[0]} states; {MADE_AGAIN}"
     if path is None:
         return
-    changes = path.get("changes", [])
-    if not isinstance(changes, list) or not all(isinstance(one, dict) for one in changes):
-        yield f"ambiguity.npz has changes {changes!r:.60}: expected a list of objects; {AGAIN}"
     k, R = np.size(path.get("l1_norms", ())), np.shape(path.get("rewards", ()))[1:]
-    shapes = {"l1_norms": (k,), "breakpoints": (k + 1,), "rewards": (k, *R), "margins": (k, shape[0]), "gap": (), "exact": ()}
+    shapes = {"l1_norms": (k,), "breakpoints": (k + 1,), "rewards": (k, *R), "margins": (k, shape[0]), "total_margins": (k,)}
+    shapes |= dict.fromkeys(("gap", "exact", "r_max", "margin_cap"), ())
     for name, expected in shapes.items():
         one = np.asarray(path.get(name, "nothing"))
         numbers = one.dtype.kind in "fb" and (name == "gap" or not np.isinf(one).any())
-        fine = numbers and (name in ("gap", "margins") or not np.isnan(one).any())
+        fine = numbers and (name in ("gap", "margins", "margin_cap") or not np.isnan(one).any())
         if one.shape != expected or not fine or R not in (shape, shape[:1]):
-            yield f"ambiguity.npz has a path with {name} of shape {one.shape} for {shape[0]} states; {AGAIN}"
+            yield f"ambiguity.npz has a path with {name} of shape {one.shape} for {shape[0]} states; {MADE_AGAIN}"
+    r_max, cap = (float(path[name]) for name in ("r_max", "margin_cap"))
+    if r_max <= 0 or cap <= 0:
+        yield f"ambiguity.npz has a path with r_max {r_max:g} and margin_cap {cap:g}: expected both above 0; {MADE_AGAIN}"
     if not (np.diff(path["breakpoints"], prepend=0.0) >= 0).all():
-        yield f"ambiguity.npz has breakpoints that do not increase from 0; {AGAIN}"
+        yield f"ambiguity.npz has breakpoints that do not increase from 0; {MADE_AGAIN}"

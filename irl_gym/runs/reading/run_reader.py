@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from irl_gym.errors import DamagedFile, IrlGymError, RunIncomplete
-from irl_gym.files.run_folder import NOT_THE_SAME, RECORDS, changed, checked_record
-from irl_gym.runs.identity import AGAIN, into_folder, ours, shell_command
+from irl_gym.files.run_folder import NOT_THE_SAME, STAGE_RECORDS, changed, checked_record
+from irl_gym.runs.identity import NEW_FOLDER, into_folder, ours, shell_command
 
 ONCE = ("config.json", "run.json")
 """Files that no stage writes: they are there from the start."""
@@ -29,7 +29,7 @@ class RunReader:
     def lost(self, what: str) -> RunIncomplete:
         """The error of a run that cannot be continued, since what says which run it is is gone."""
         again = shell_command(None if self.command is None else into_folder(self.command))
-        told = f"with another --out: {again}" if again else f"in a new folder: recover_and_retrain(experiment, {AGAIN!r})"
+        told = f"with another --out: {again}" if again else f"in a new folder: recover_and_retrain(experiment, {NEW_FOLDER!r})"
         return RunIncomplete(
             f"{self.path} is damaged: {what}: expected what the run wrote at its start, which no stage writes again. Make the "
             f"run again, {told}"
@@ -56,7 +56,7 @@ class RunReader:
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """The record of a stage; None where it has none."""
-        name = f"{RECORDS}/{stage}.json"
+        name = f"{STAGE_RECORDS}/{stage}.json"
         if not (self.path / name).exists():
             return None
         try:

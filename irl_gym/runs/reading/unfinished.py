@@ -11,14 +11,13 @@ import numpy as np
 from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.errors import IrlGymError
-from irl_gym.features.linear_reward import LinearReward, load_reward
+from irl_gym.features.linear_reward import load_reward
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, changed, checked_record, read_json, read_record
-from irl_gym.files.run_schema import Config, Environment
+from irl_gym.files.run_schema import Config, EnvironmentFile
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.mdp.episodes import empirical_policy
 from irl_gym.mdp.policies import load_actions
-from irl_gym.mdp.rewards import TabularReward
 from irl_gym.programs.status import Status
 from irl_gym.runs.certificates import claims_in, read_certificate
 from irl_gym.runs.identity import ENVIRONMENT, FIRST
@@ -34,7 +33,7 @@ def left_behind(path: Path) -> Case | None:
         if any(changed(path, read_record(path, stage) or {}) for stage in (START, *FIRST)):
             return None
         config = read_json(path / "config.json", Config)
-        space = told_space("observations", read_json(path / ENVIRONMENT, Environment)["observations"])
+        space = told_space("observations", read_json(path / ENVIRONMENT, EnvironmentFile)["observations"])
         table = load_table(path / TABLE, space)
         record = read_record(path, "reward") or {}
         learned = load_reward(path / "reward.npz") if record else None
@@ -42,12 +41,10 @@ def left_behind(path: Path) -> Case | None:
         claims = claims_in(read_certificate(path / "certificate.json")) if record else {}
     except (OSError, IrlGymError):
         return None
-    reward: Any = learned.tabular(table.states) if isinstance(learned, LinearReward) else learned
-    if reward is not None and not isinstance(reward, TabularReward):
-        return None
+    reward = None if learned is None else learned.tabular(table.states)
     return Case(
         table.mdp, expert, reward, claims, Status(record["status"]) if record else None, record.get("stats", {}), table.reward,
-        bool(config.get("shaping")), weights=learned.alpha if isinstance(learned, LinearReward) else None,
+        bool(config.get("shaping")), weights=None if learned is None else learned.alpha,
     )  # fmt: skip
 
 

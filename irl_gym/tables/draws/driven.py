@@ -12,7 +12,7 @@ import operator
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any, NoReturn
 
-from irl_gym.tables.draws.uniforms import Run, Uniform, Unit
+from irl_gym.tables.draws.uniforms import CallRun, Uniform, Unit
 
 
 class Odd(Exception):
@@ -25,7 +25,7 @@ class Unlisted(Unit):
     __slots__ = ()
     kind = ""
 
-    def __init__(self, run: Run, method: str):
+    def __init__(self, run: CallRun, method: str):
         super().__init__(run, method)
         self.low, self.high = -math.inf, math.inf
 
@@ -34,7 +34,7 @@ class Unlisted(Unit):
         self.refuse("is used, and its outcomes cannot be listed one by one")
 
 
-def pick(run: Run, method: str, keys: Sequence[Hashable], weights: Sequence[float] | None = None) -> int:
+def pick(run: CallRun, method: str, keys: Sequence[Hashable], weights: Sequence[float] | None = None) -> int:
     """The first index of one of the distinct keys. Without weights each index is equally probable."""
     groups: dict[Hashable, float] = {}
     firsts = []
@@ -49,7 +49,7 @@ def pick(run: Run, method: str, keys: Sequence[Hashable], weights: Sequence[floa
     return firsts[run.choose(method, len(firsts), [weight / total for weight in groups.values()])]
 
 
-def order(run: Run, method: str, keys: Sequence[Hashable], k: int, weights: list[float] | None = None) -> list[int]:
+def order(run: CallRun, method: str, keys: Sequence[Hashable], k: int, weights: list[float] | None = None) -> list[int]:
     """Indices of k keys, one after the other, none twice; of equal keys the first comes first."""
     n, distinct = len(keys), len(set(keys))
     if distinct == n:
@@ -62,7 +62,7 @@ def order(run: Run, method: str, keys: Sequence[Hashable], k: int, weights: list
     return taken
 
 
-def afford(run: Run, method: str, outcomes: int) -> None:
+def afford(run: CallRun, method: str, outcomes: int) -> None:
     """Refuse a method whose outcomes are too many before the first of them is tried."""
     if outcomes > run.most:
         run.refuse_many(method, outcomes)
@@ -81,32 +81,32 @@ def keys_of(items: Iterable[Any]) -> list[Hashable]:
     return keys
 
 
-def _random(run: Run) -> Uniform:
+def _random(run: CallRun) -> Uniform:
     return Uniform(Unit(run, "random"))
 
 
-def _uniform(run: Run, a: float, b: float) -> Any:
+def _uniform(run: CallRun, a: float, b: float) -> Any:
     if not math.isfinite(b - a):
         raise Odd(f"uniform({a}, {b})")
     return Uniform(Unit(run, "uniform")) * (b - a) + a
 
 
-def unlisted(run: Run, method: str, mean: float, deviation: float) -> Any:
+def unlisted(run: CallRun, method: str, mean: float, deviation: float) -> Any:
     """A normal number, which is its mean where it does not deviate."""
     if not (math.isfinite(mean) and 0 <= deviation < math.inf):
         raise Odd(f"{method}({mean}, {deviation})")
     return Uniform(Unlisted(run, method)) * float(deviation) + float(mean)
 
 
-def _gauss(run: Run, mu: float = 0.0, sigma: float = 1.0) -> Any:
+def _gauss(run: CallRun, mu: float = 0.0, sigma: float = 1.0) -> Any:
     return unlisted(run, "gauss", mu, sigma)
 
 
-def _normalvariate(run: Run, mu: float = 0.0, sigma: float = 1.0) -> Any:
+def _normalvariate(run: CallRun, mu: float = 0.0, sigma: float = 1.0) -> Any:
     return unlisted(run, "normalvariate", mu, sigma)
 
 
-def _randrange(run: Run, start: int, stop: int | None = None, step: int = 1) -> int:
+def _randrange(run: CallRun, start: int, stop: int | None = None, step: int = 1) -> int:
     try:
         span = range(operator.index(start)) if stop is None else range(start, stop, step)
     except (TypeError, ValueError):
@@ -116,26 +116,26 @@ def _randrange(run: Run, start: int, stop: int | None = None, step: int = 1) -> 
     return span[run.choose("randrange", len(span))]
 
 
-def _randint(run: Run, a: int, b: int) -> int:
+def _randint(run: CallRun, a: int, b: int) -> int:
     if b < a:
         raise Odd("an empty range")
     return a + run.choose("randint", b - a + 1)
 
 
-def _getrandbits(run: Run, k: int) -> int:
+def _getrandbits(run: CallRun, k: int) -> int:
     if k < 0:
         raise Odd("so few bits")
     return run.choose("getrandbits", 2**k)
 
 
-def _choice(run: Run, seq: Any) -> Any:
+def _choice(run: CallRun, seq: Any) -> Any:
     if not len(seq):
         raise Odd("a choice of nothing")
     return seq[pick(run, "choice", keys_of(seq))]
 
 
 def _choices(
-    run: Run, population: Any, weights: Iterable[float] | None = None, *, cum_weights: Any = None, k: int = 1
+    run: CallRun, population: Any, weights: Iterable[float] | None = None, *, cum_weights: Any = None, k: int = 1
 ) -> list[Any]:
     if weights is not None and cum_weights is not None:
         raise Odd("both kinds of weights")
@@ -153,13 +153,13 @@ def _choices(
     return [population[pick(run, "choices", keys, chances)] for _ in range(k)]
 
 
-def _shuffle(run: Run, x: Any) -> None:
+def _shuffle(run: CallRun, x: Any) -> None:
     items = list(x)
     for place, index in enumerate(order(run, "shuffle", keys_of(items), len(items))):
         x[place] = items[index]
 
 
-def _sample(run: Run, population: Any, k: int, *, counts: Iterable[int] | None = None) -> list[Any]:
+def _sample(run: CallRun, population: Any, k: int, *, counts: Iterable[int] | None = None) -> list[Any]:
     if not isinstance(population, Sequence):
         raise Odd(f"a sample of a {type(population).__name__}")
     items = list(population)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.tables.draws.driven import Odd, afford, keys_of, order, pick, unlisted
-from irl_gym.tables.draws.uniforms import Run, Uniform, Unit
+from irl_gym.tables.draws.uniforms import CallRun, Uniform, Unit
 
 
 def _array_keys(array: np.ndarray, axis: int = 0) -> list[Hashable]:
@@ -70,7 +70,7 @@ def _chances(p: Any, n: int) -> list[float]:
 
 
 def _integers(
-    run: Run, low: Any, high: Any = None, size: Any = None, dtype: Any = np.int64, endpoint: bool = False,
+    run: CallRun, low: Any, high: Any = None, size: Any = None, dtype: Any = np.int64, endpoint: bool = False,
     *, method: str = "integers"
 ) -> Any:  # fmt: skip
     """Each whole number of [low, high), or of [low, high]."""
@@ -98,12 +98,12 @@ def _integers(
     return _filled(drawn, shape, dtype)
 
 
-def _randint(run: Run, low: Any, high: Any = None, size: Any = None, dtype: Any = int) -> Any:
+def _randint(run: CallRun, low: Any, high: Any = None, size: Any = None, dtype: Any = int) -> Any:
     return _integers(run, low, high, size, dtype, method="randint")
 
 
 def _choice(
-    run: Run, a: Any, size: Any = None, replace: bool = True, p: Any = None, axis: int = 0, shuffle: bool = True
+    run: CallRun, a: Any, size: Any = None, replace: bool = True, p: Any = None, axis: int = 0, shuffle: bool = True
 ) -> Any:
     """Elements of a sequence, or of range(a)."""
     array = np.asarray(a)
@@ -132,13 +132,13 @@ def _choice(
     return array.take(index, axis=axis) if array.ndim > 1 or shape is not None else array[index]
 
 
-def _choice_of_state(run: Run, a: Any, size: Any = None, replace: bool = True, p: Any = None) -> Any:
+def _choice_of_state(run: CallRun, a: Any, size: Any = None, replace: bool = True, p: Any = None) -> Any:
     if np.ndim(a) > 1:
         raise Odd("a choice of several dimensions")
     return _choice(run, a, size, replace, p)
 
 
-def _uniform(run: Run, low: Any = 0.0, high: Any = 1.0, size: Any = None, *, method: str = "uniform") -> Any:
+def _uniform(run: CallRun, low: Any = 0.0, high: Any = 1.0, size: Any = None, *, method: str = "uniform") -> Any:
     """Uniform numbers that are compared instead of drawn."""
     shape, bounds = _broadcast(_shape(size), low, high)
     numbers = []
@@ -149,38 +149,38 @@ def _uniform(run: Run, low: Any = 0.0, high: Any = 1.0, size: Any = None, *, met
     return _filled(numbers, shape, object)
 
 
-def _normal(run: Run, loc: Any = 0.0, scale: Any = 1.0, size: Any = None, *, method: str = "normal") -> Any:
+def _normal(run: CallRun, loc: Any = 0.0, scale: Any = 1.0, size: Any = None, *, method: str = "normal") -> Any:
     """Normal numbers, of which nothing is known but their mean where they do not deviate."""
     shape, each = _broadcast(_shape(size), loc, scale)
     numbers = [unlisted(run, method, *single) for single in each]
     return _filled(numbers, shape, object if any(isinstance(one, Uniform) for one in numbers) else np.float64)
 
 
-def _standard_normal(run: Run, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
+def _standard_normal(run: CallRun, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
     if out is not None or np.dtype(dtype) != np.float64:
         raise Odd(f"{np.dtype(dtype)} numbers, or numbers in an array")
     return _normal(run, size=size, method="standard_normal")
 
 
-def _randn(run: Run, *shape: int) -> Any:
+def _randn(run: CallRun, *shape: int) -> Any:
     return _normal(run, size=shape or None, method="randn")
 
 
-def _random(run: Run, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
+def _random(run: CallRun, size: Any = None, dtype: Any = np.float64, out: Any = None) -> Any:
     if out is not None or np.dtype(dtype) != np.float64:
         raise Odd(f"{np.dtype(dtype)} numbers, or numbers in an array")
     return Uniform(Unit(run, "random")) if size is None else _uniform(run, size=size, method="random")
 
 
-def _random_sample(run: Run, size: Any = None) -> Any:
+def _random_sample(run: CallRun, size: Any = None) -> Any:
     return _random(run, size)
 
 
-def _rand(run: Run, *shape: int) -> Any:
+def _rand(run: CallRun, *shape: int) -> Any:
     return _random(run, shape or None)
 
 
-def _permutation(run: Run, x: Any, axis: int = 0) -> Any:
+def _permutation(run: CallRun, x: Any, axis: int = 0) -> Any:
     """range(x), or the elements of x, in any order."""
     array = np.asarray(x)
     if array.ndim == 0:
@@ -188,7 +188,7 @@ def _permutation(run: Run, x: Any, axis: int = 0) -> Any:
     return array.take(order(run, "permutation", _array_keys(array, axis), array.shape[axis]), axis=axis)
 
 
-def _permuted(run: Run, x: Any, axis: int | None = None, out: Any = None) -> Any:
+def _permuted(run: CallRun, x: Any, axis: int | None = None, out: Any = None) -> Any:
     """All elements of x in any order, in its shape."""
     array = np.asarray(x)
     if out is not None or array.ndim == 0 or (axis is not None and array.ndim > 1):
@@ -197,7 +197,7 @@ def _permuted(run: Run, x: Any, axis: int | None = None, out: Any = None) -> Any
     return flat.take(order(run, "permuted", _array_keys(flat), flat.size)).reshape(array.shape)
 
 
-def _shuffle(run: Run, x: Any, axis: int = 0) -> None:
+def _shuffle(run: CallRun, x: Any, axis: int = 0) -> None:
     """Put the elements of x in any order, in place."""
     if isinstance(x, np.ndarray):
         x[...] = x.take(order(run, "shuffle", _array_keys(x, axis), x.shape[axis]), axis=axis)
@@ -207,7 +207,7 @@ def _shuffle(run: Run, x: Any, axis: int = 0) -> None:
         x[place] = items[index]
 
 
-def _counts(run: Run, method: str, table: Callable[..., list[float]], size: Any, *arguments: Any) -> Any:
+def _counts(run: CallRun, method: str, table: Callable[..., list[float]], size: Any, *arguments: Any) -> Any:
     """Whole numbers from 0, with a table of their probabilities for each single draw."""
     shape, each = _broadcast(_shape(size), *arguments)
     drawn = []
@@ -224,7 +224,7 @@ def _binomial_table(n: Any, p: float) -> list[float]:
     return [math.comb(n, k) * p**k * (1 - p) ** (n - k) for k in range(n + 1)]
 
 
-def _binomial(run: Run, n: Any, p: Any, size: Any = None) -> Any:
+def _binomial(run: CallRun, n: Any, p: Any, size: Any = None) -> Any:
     """How many of n trials hit."""
     return _counts(run, "binomial", _binomial_table, size, n, p)
 
@@ -237,12 +237,12 @@ def _hypergeometric_table(good: Any, bad: Any, taken: Any) -> list[float]:
     return [math.comb(good, k) * math.comb(bad, taken - k) / ways for k in range(min(good, taken) + 1)]
 
 
-def _hypergeometric(run: Run, ngood: Any, nbad: Any, nsample: Any, size: Any = None) -> Any:
+def _hypergeometric(run: CallRun, ngood: Any, nbad: Any, nsample: Any, size: Any = None) -> Any:
     """How many of a sample are good."""
     return _counts(run, "hypergeometric", _hypergeometric_table, size, ngood, nbad, nsample)
 
 
-def _multinomial(run: Run, n: Any, pvals: Any, size: Any = None) -> Any:
+def _multinomial(run: CallRun, n: Any, pvals: Any, size: Any = None) -> Any:
     """How often each of several outcomes comes in n trials: one binomial draw after the other."""
     if size is not None or np.ndim(n) or np.ndim(pvals) != 1:
         raise Odd("several draws")

@@ -21,7 +21,7 @@ import numpy as np
 
 
 @runtime_checkable
-class Run(Protocol):
+class CallRun(Protocol):
     """What a draw needs to know of the call that it happens in."""
 
     number: int
@@ -48,7 +48,7 @@ class Unit:
     __slots__ = ("high", "low", "method", "number", "run")
     kind = "uniform "
 
-    def __init__(self, run: Run, method: str):
+    def __init__(self, run: CallRun, method: str):
         self.run, self.number, self.method = run, run.number, method
         self.low, self.high = 0.0, 1.0
 

@@ -22,7 +22,7 @@ from irl_gym.files.archives import json_in, read_arrays
 from irl_gym.files.own_files import write_arrays
 from irl_gym.spaces.integer_spaces import checked_members, keys_of_numbers, numbers_of_keys, ranges
 
-Script = tuple[int, ...]
+ScriptKey = tuple[int, ...]
 """Outcomes of draws; (-1, i) is run i of a call whose draws could not be enumerated."""
 
 COUNTED = {
@@ -55,7 +55,7 @@ class Explored:
         self.ids: dict[Hashable, int] = {}
         self.ends: dict[Hashable, int] = {}
         self.parents, self.actions = array("q"), array("q")
-        self.scripts: list[Script] = []
+        self.scripts: list[ScriptKey] = []
         self.rows, self.successors = array("q"), array("q")
         self.probabilities, self.rewards = array("d"), array("d")
         self.first_line = array("q", [0])
@@ -86,7 +86,7 @@ class Explored:
         """Was the reset counted, since its draws cannot be listed?"""
         return any(self.scripts[number][:1] == (-1,) for number in self.starts)
 
-    def add(self, key: Hashable, parent: int, action: int, script: Script) -> int:
+    def add(self, key: Hashable, parent: int, action: int, script: ScriptKey) -> int:
         """Number a new state; the parent of a start is -1."""
         number = self.ids[key] = len(self.keys)
         self.keys.append(key)

@@ -32,16 +32,17 @@ WORDS = 4 * 625
 
 
 class OutsideRandomness(Exception):
-    """Internal: something is random that is not driven; its argument names it."""
+    """Internal: something is random that is not driven; its arguments name what."""
 
-    def __init__(self, what: str = UNSEEN):
-        super().__init__(what)
-        self.what = what
+    def __init__(self, *names: str):
+        self.names = names or (UNSEEN,)
+        self.what = " and ".join(sorted(self.names))
+        super().__init__(self.what)
 
     @property
     def of_modules(self) -> bool:
         """Are all of them the generators of modules, whose functions can be driven?"""
-        return set(self.what.split(" and ")) <= {PYTHONS, NUMPYS}
+        return {*self.names} <= {PYTHONS, NUMPYS}
 
 
 class Watch:
@@ -80,7 +81,7 @@ class Watch:
                 moved.remove(PYTHONS)
             self.begin()
         if moved:
-            raise OutsideRandomness(" and ".join(sorted(moved)))
+            raise OutsideRandomness(*moved)
 
     def _now(self) -> tuple[Any, ...]:
         return (*shared_mark(), *map(_state, self._held.values()))

@@ -18,7 +18,7 @@ from irl_gym.errors import NotEnumerable
 from irl_gym.tables.copies.calls import called, seeded_globals, stepped
 from irl_gym.tables.copies.snapshots import Snapshots
 from irl_gym.tables.draws.exact_draws import Draws
-from irl_gym.tables.enumeration.explored import Script
+from irl_gym.tables.enumeration.explored import ScriptKey
 from irl_gym.tables.enumeration.limits import Limits
 from irl_gym.tables.enumeration.outside import OutsideRandomness, Watch
 
@@ -39,11 +39,11 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CallOutcome:
     """One outcome of a call, and what was made of it while the environment was in it."""
 
     probability: float
-    script: Script
+    script: ScriptKey
     result: Result
     made: Any
 
@@ -52,7 +52,7 @@ class Outcome:
 class Outcomes:
     """All outcomes of a call."""
 
-    all: list[Outcome]
+    all: list[CallOutcome]
     runs: int
     """Runs that were counted; 0 where the outcomes were enumerated."""
 
@@ -135,7 +135,7 @@ class Trials:
             if i % PULSE == PULSE - 1:
                 self.pulse()
             result = self.again(call, row, (-1, i))
-            found.append(Outcome(1 / runs, (-1, i), result, make(result)))
+            found.append(CallOutcome(1 / runs, (-1, i), result, make(result)))
         return Outcomes(found, runs)
 
     def look(self, *calls: Call) -> None:
@@ -152,7 +152,7 @@ class Trials:
         with suppress(NotEnumerable):  # it is counted
             deque(islice(self.draws.outcomes(call), MADE_AGAIN), maxlen=0)
 
-    def again(self, call: Call, row: int, script: Script) -> Result:
+    def again(self, call: Call, row: int, script: ScriptKey) -> Result:
         """The outcome of a script."""
         if script[:1] != (-1,):
             return self.draws.replay(script, call)
@@ -179,18 +179,18 @@ class Trials:
         self._watch.begin()
         return result
 
-    def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[Outcome] | None:
+    def _enumerated(self, call: Call, make: Callable[[Result], Any]) -> list[CallOutcome] | None:
         """All outcomes; None for a random call after others had too many."""
         found = []
         for probability, script, result in self.draws.outcomes(call):
-            found.append(Outcome(probability, script, result, make(result)))
+            found.append(CallOutcome(probability, script, result, make(result)))
             if len(found) % PULSE == 0:
                 self.pulse()
             if self.refusals >= MOST_REFUSALS and probability < 1:
                 return None
         return found
 
-    def _check(self, last: Outcome, call: Call) -> None:
+    def _check(self, last: CallOutcome, call: Call) -> None:
         before, paid, ended = last.result
         observation, reward, terminated = self.again(call, 0, last.script)
         if not _same(observation, before) or terminated != ended or abs(reward - paid) > ROUNDING:

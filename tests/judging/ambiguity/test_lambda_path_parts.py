@@ -124,7 +124,7 @@ def described(before, after, margins=((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))):
     """The change from one reward to another, of norms 2 and 1, totals 5 and 4."""
     numbers = np.array([before, after], dtype=float)
     points, total, norm = np.array([0.0, 1.0, 4.0]), np.array([5.0, 4.0]), np.array([2.0, 1.0])
-    return changes(points, numbers, np.array(margins, dtype=float), total, norm, r_max=1.0, unit=1.0)[1]
+    return changes(points, numbers, np.array(margins, dtype=float), total, norm, r_max=1.0, margin_cap=None)[1]
 
 
 def test_change_tells_which_rewards_reach_and_leave_zero_and_bounds():
@@ -147,6 +147,12 @@ def test_change_is_told_in_a_sentence():
     )
 
 
+def test_change_is_told_with_names():
+    found = described([1, 0.5, 0], [0, 0, 0], [[1, 1, np.nan], [0, 1, np.nan]])
+    told = found.sentence("cell {}".format)
+    assert "the reward of (cell 0) and (cell 1) becomes 0; " in told and "the margin of (cell 0) falls to 0; " in told
+
+
 def test_changes_add_up_to_the_whole_path():
     model = paper_grid()
     path = lambda_path(model.mdp, model.expert)
@@ -162,3 +168,6 @@ def test_change_of_rewards_on_steps_names_states_and_actions():
     path = lambda_path(model.mdp, model.expert, reward_on="state-action", most_pieces=4)
     last = path.changes[-1].to_zero
     assert last.shape[1] == 2 and (path.rewards[-1][tuple(last.T)] != 0).all()
+    assert "(0 by 3) and (1 by 2) becomes 0" in replace(path.changes[-1], to_zero=np.array([[0, 3], [1, 2]])).sentence(
+        "{} by {}".format
+    )

@@ -9,6 +9,7 @@ import tyro
 import irl_gym.judging.diagnoses
 from irl_gym.commands.arguments import Arguments
 from irl_gym.commands.terminal import OPTIONS
+from irl_gym.judging.diagnoses.findings import told_finding
 from irl_gym.judging.diagnoses.plain_words import RECORDING, usable_flags, with_names
 
 CHOSEN = {
@@ -47,10 +48,32 @@ def test_a_run_from_a_dataset_is_told_no_flag_for_other_episodes():
     assert usable_flags(flags) == flags and usable_flags(flags, given=True) == ("--l1 0",)
 
 
-def test_states_and_actions_get_their_names_behind_them():
-    told = with_names("It loses in s=13 a=2, s=3 and 4 more; l1=3.", lambda row: f"row {row // 8}, column {row % 8}", "abcd")
-    assert told == "It loses in s=13 a=2 (row 1, column 5; c), s=3 (row 0, column 3) and 4 more; l1=3."
+TIED = {"sentence": "It loses in {where}; l1=3.", "states": [13, *range(3, 8)], "actions": []}
+
+
+def told(found, actions="abcd"):
+    """The sentence of a finding with the names of states on a grid of 8 columns."""
+    return told_finding(found, lambda s, a: with_names(s, a, lambda row: f"row {row // 8}, column {row % 8}", actions))
+
+
+@pytest.mark.parametrize(
+    ("changed", "where"),
+    [
+        ({"states": [13, 3], "actions": [2, 0]}, "s=13 a=2 (row 1, column 5; c), s=3 a=0 (row 0, column 3; a)"),
+        ({"states": [13]}, "s=13 (row 1, column 5)"),
+    ],
+)
+def test_states_and_actions_get_their_names_behind_them(changed, where):
+    assert told(TIED | changed) == f"It loses in {where}; l1=3."
+
+
+def test_a_sentence_names_five_states_and_counts_the_others():
+    assert told_finding(TIED) == "It loses in s=13, s=3, s=4, s=5, s=6 and 1 more; l1=3."
+
+
+def test_what_a_sentence_says_of_states_in_words_is_no_state():
+    assert told(TIED | {"sentence": "In s=13 a=9, by its own words.", "states": [3]}) == "In s=13 a=9, by its own words."
 
 
 def test_states_that_are_bare_numbers_are_not_named_twice():
-    assert with_names("s=4, s=5 a=0", lambda row: f"state {row}", ("left",)) == "s=4, s=5 a=0 (left)"
+    assert [with_names(4, a, lambda row: f"state {row}", ("left",)) for a in (None, 0)] == ["s=4", "s=4 a=0 (left)"]

@@ -13,7 +13,6 @@ from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.proofs.feature_proof import SampledFeatureProof
 
 GRID = paper_grid()
-PLANNERS = ("SB3", "ValueIteration")
 FEW = np.random.default_rng(0).normal(size=(25, 2))
 
 
@@ -49,7 +48,8 @@ def test_one_episode_is_told_to_tell_no_noise(regret):
 
 
 def test_an_exact_inner_planner_is_given_no_flags():
-    told = [finding("planner-fell-short", sampled(regret=-1.0, stats={"inner": inner}), None, None) for inner in PLANNERS]
+    patients = (sampled(regret=-1.0, stats={"exact_planner": exact}) for exact in (False, True))
+    told = [finding("planner-fell-short", one, None, None) for one in patients]
     assert [one.flags for one in told] == [("--total-timesteps",), ()]
 
 

@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from certified import both
 from models import paper_grid
 from patients import finding, judged, names, partly_contradicted
 
+from irl_gym.judging.diagnoses.findings import told_finding
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
@@ -24,7 +27,9 @@ def lake(toy_text, name="FrozenLake 4x4 slippery"):
 
 def test_an_expert_that_is_not_optimal_is_told_with_states_and_actions():
     said = finding("expert-not-optimal", judged(GRID.mdp, GRID.expert, -GRID.R), GRID.mdp, GRID.expert)
-    assert said.states.size == len(said.actions) > 0 and f"s={said.states[0]} a={said.actions[0]}" in said.sentence
+    assert said.states.size == len(said.actions) > 0 and f"s={said.states[0]} a={said.actions[0]}" in told_finding(
+        said.to_json()
+    )
 
 
 def test_the_defaults_mend_an_expert_that_is_not_optimal():
@@ -95,3 +100,16 @@ def test_actions_of_the_same_successors_and_the_same_true_reward_are_no_finding(
     mdp, expert, _ = lake(toy_text, "CliffWalking slippery")
     same = np.zeros(mdp.n_states)
     assert "same-successors" not in names(FiniteLP().fit(mdp, expert), mdp, expert, true=same)
+
+
+@pytest.mark.parametrize("known", [25, 20])
+@pytest.mark.parametrize("mixing", [False, True])
+def test_the_doctor_calls_those_states_violated_that_the_certificate_does(known, mixing):
+    reward = np.random.default_rng(7).normal(size=25)
+    expert = np.eye(4)[GRID.expert].astype(float)
+    expert[3] = [0.5, 0.5, 0, 0] if mixing else expert[3]
+    expert[known:] = np.nan
+    found = certify(GRID.mdp, expert, reward)
+    said = finding("expert-not-optimal", judged(GRID.mdp, expert, reward), GRID.mdp, expert)
+    assert sorted(set(said.states.tolist())) == found.violated.tolist()
+    assert dict((one.label, one.sentence) for one in found.facts())["violated"] in said.sentence

@@ -104,7 +104,8 @@ def test_the_doctor_s_answers_are_told_with_their_runs(runs, tmp_path, diagnoses
 
 
 def test_the_doctor_says_of_a_run_what_its_own_page_says(runs, tmp_path):
-    found = {"name": "few-episodes", "sentence": "Tied in s=1 a=0.", "mend": "More episodes.", "flags": ["--episodes"]}
+    found = {"name": "few-episodes", "sentence": "Tied in {where}.", "mend": "More episodes.", "flags": ["--episodes"]}
+    found |= {"states": [1], "actions": [0]}
     ill = with_doctor(runs["lake"], {**HEALTHY, "answer": "findings", "findings": [found]})
     write_comparison([ill, runs["priced"]], tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text()

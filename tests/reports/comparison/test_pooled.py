@@ -7,11 +7,11 @@ import pytest
 from reports.page.made_runs import stepped_run, table_run
 
 from irl_gym.judging.curves import Curve
-from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
+from irl_gym.reports.comparison.compared_runs import lettered
+from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.comparison.pooled import over_seeds, told
 from irl_gym.reports.comparison.ranked import sentence
-from irl_gym.reports.comparison.shared_worlds import run_places
-from irl_gym.runs.pooling import pools
+from irl_gym.runs.supply import supplied
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def page(seeds, tmp_path_factory):
 
 def section_of(runs, *, same=True):
     named = lettered(runs)
-    return over_seeds(pools(named), run_places(named), same=same)
+    return over_seeds(named.pools, named.places, same)
 
 
 def with_metrics(run, policy, **changes):
@@ -63,13 +63,13 @@ def test_a_page_of_seeds_fits_a_phone(page, look):
 
 def test_of_few_seeds_it_is_the_mean_and_says_so(seeds):
     named = lettered(seeds[:3])
-    assert "the mean with its" in sentence(named, pools(named))
+    assert "the mean with its" in supplied(sentence, named)
     assert "Of fewer than 4 seeds nothing is left out" in section_of(seeds[:3]).lead
 
 
 def test_the_verdict_over_seeds_says_when_each_has_its_own_expert(seeds):
     named = lettered([*seeds[:3], with_metrics(seeds[3], "expert", value=9.0)])
-    assert sentence(named, pools(named)).endswith("By score random actions are 0, the own expert of each is 1.")
+    assert supplied(sentence, named).endswith("By score random actions are 0, the own expert of each is 1.")
 
 
 def test_runs_of_one_seed_have_no_section(seeds):
@@ -77,7 +77,7 @@ def test_runs_of_one_seed_have_no_section(seeds):
 
 
 def test_a_pool_is_told_in_a_line(seeds):
-    (pool,) = pools(lettered(seeds))
+    (pool,) = lettered(seeds).pools
     whose = "runs A, B, C, D, interquartile mean over 4 seeds: "
     means = r"score [0-9.]+ \(.*\), mean return [-0-9.]+ \(.*\) where random actions have .*, the expert .*"
     assert re.fullmatch(whose + means + r"; left open \(0.685 of value, 0.685 of mean return\)", told(pool))
@@ -85,7 +85,7 @@ def test_a_pool_is_told_in_a_line(seeds):
 
 def test_a_fourth_policy_is_pooled_beside_the_agents(seeds):
     runs = [with_metrics(run, "cloned", **{**run.metrics["policies"]["random"], "score": 0.1}) for run in seeds[:2]]
-    (pool,) = pools(lettered(runs))
+    (pool,) = lettered(runs).pools
     assert told(pool).endswith("; cloned: score 0.100 (too few to say), not good (0.100 of value, 0.000 of mean return)")
     found = cells(section_of(runs))
     assert found["score of cloned (95 %)"] == ["0.100 (too few to say)"] and "score of the retrained agents (95 %)" in found
@@ -93,7 +93,7 @@ def test_a_fourth_policy_is_pooled_beside_the_agents(seeds):
 
 def test_a_pool_without_a_score_is_told_in_a_line_and_in_its_table(seeds):
     runs = [with_metrics(seeds[0], "retrained", score=None), *seeds[1:3]]
-    (pool,) = pools(lettered(runs))
+    (pool,) = lettered(runs).pools
     assert told(pool).startswith("runs A, B, C: no score, since not every one of the 3 seeds has one; mean return ")
     found = cells(section_of(runs))
     assert (found["score of the retrained agents (95 %)"], found["the retrained agents, judged by the worse share"]) == (

@@ -7,9 +7,10 @@ import pytest
 from reports.page.made_runs import stepped_run, table_run
 
 from irl_gym.judging.curves import Curve
-from irl_gym.reports.comparison.comparison_page import lettered
+from irl_gym.reports.comparison.compared_runs import lettered
 from irl_gym.reports.comparison.ranked import learning, sentence
-from irl_gym.reports.comparison.shared_worlds import agree, one_scale, one_world, run_places
+from irl_gym.reports.comparison.shared_worlds import agree
+from irl_gym.runs.supply import supplied
 
 
 @pytest.fixture(scope="module")
@@ -38,25 +39,25 @@ def levels(section):
     ],
 )  # fmt: skip
 def test_a_world_is_another_when_anything_is_made_otherwise(lake, changes):
-    assert not one_world({"A": lake, "B": with_config(lake, **changes)})
+    assert not lettered([lake, with_config(lake, **changes)]).same_world
 
 
 def test_two_datasets_environments_are_two_worlds(lake):
-    assert not one_world({name: with_config(lake, env_id=None, dataset=f"{name}-v0") for name in "AB"})
+    assert not lettered([with_config(lake, env_id=None, dataset=f"{name}-v0") for name in "AB"]).same_world
 
 
 @pytest.mark.parametrize("changes", [{"seed": 5}, {"learner": {"type": "FeatureLP"}}, {"dataset": "a/b-v0"}, {"episodes": 3}])
 def test_a_world_is_the_same_when_only_who_learns_there_differs(lake, changes):
-    assert one_world({"A": lake, "B": with_config(lake, **changes)})
+    assert lettered([lake, with_config(lake, **changes)]).same_world
 
 
 def test_a_world_is_the_same_when_only_the_seed_of_its_table_differs(lake):
     sampled = [with_config(lake, table={"type": "Interaction", "steps": 9, "seed": seed}, seed=seed) for seed in (0, 1)]
-    assert one_world(lettered(sampled))
+    assert lettered(sampled).same_world
 
 
 def test_worlds_of_one_id_are_told_apart(lake):
-    assert run_places(lettered([lake, with_config(lake, bins=9, gamma=0.5)])) == {
+    assert lettered([lake, with_config(lake, bins=9, gamma=0.5)]).places == {
         "A": "FrozenLake-v1 (gamma=0.9)",
         "B": "FrozenLake-v1 (gamma=0.5, bins=9)",
     }
@@ -73,18 +74,18 @@ def test_values_agree_but_for_rounding(values, same):
 @pytest.mark.parametrize("policy", ["expert", "random"])
 def test_no_run_is_best_when_scores_are_not_on_one_scale(lake, policy):
     named = lettered([lake, worth(with_config(lake, episodes=3), policy, 0.123)])
-    words = sentence(named, [])
-    assert not one_scale(named) and one_world(named)
+    words = supplied(sentence, named)
+    assert not named.same_scale and named.same_world
     assert "best" not in words and "its own expert" in words and "not worth the same" in words
 
 
 def test_the_best_run_is_named_when_scores_are_on_one_scale(lake, tmp_path):
     better = table_run(tmp_path, errors=0, films=False)
-    assert "The retrained agent of run B has the best score" in sentence(lettered([lake, better]), [])
+    assert "The retrained agent of run B has the best score" in supplied(sentence, lettered([lake, better]))
 
 
 def test_each_curve_has_its_own_expert_when_experts_differ(lake):
-    found = learning(lettered([lake, worth(lake, "expert", 0.9)]))
+    found = supplied(learning, lettered([lake, worth(lake, "expert", 0.9)]))
     assert list(levels(found)) == ["expert of run A", "expert of run B", "random"]
     own = levels(found)["expert of run B"]
     curve = next(one for one in found.panels[0].figure.data if one.name == "run B")
@@ -93,17 +94,17 @@ def test_each_curve_has_its_own_expert_when_experts_differ(lake):
 
 
 def test_curves_have_one_level_when_experts_agree(lake):
-    found = learning(lettered([lake, lake]))
+    found = supplied(learning, lettered([lake, lake]))
     assert list(levels(found)) == ["expert", "random"] and "own colour" not in found.panels[0].caption
 
 
 def test_curves_of_two_worlds_are_scores(lake, tmp_path):
-    found = learning(lettered([lake, stepped_run(tmp_path)]))
+    found = supplied(learning, lettered([lake, stepped_run(tmp_path)]))
     assert found.panels[0].title == "Score" and [one.y[0] for one in levels(found).values()] == [1.0, 0.0]
 
 
 def test_a_run_without_a_curve_is_named_beside_the_curves(lake):
     planned = replace(lake, curve=Curve(*np.zeros((5, 0))))
-    found = learning(lettered([lake, planned]))
+    found = supplied(learning, lettered([lake, planned]))
     assert found.lead.endswith("Without a curve, as nobody was trained step by step, or without a score: B.")
-    assert "Without a curve" not in learning(lettered([lake, lake])).lead
+    assert "Without a curve" not in supplied(learning, lettered([lake, lake])).lead

@@ -14,7 +14,7 @@ from irl_gym.judging.metrics import agreement, optimal_actions, policy_value, ra
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.sections.verdict import verdict
 from irl_gym.runs.certificates import certificate_of
 from irl_gym.runs.experiment import Experiment
@@ -32,14 +32,14 @@ NO_CURVE = Curve(*np.zeros((5, 0)))
 
 def scene_of(run):
     """What is known of a run state by state."""
-    found = Contents(run).scene
+    found = RunContents(run).scene
     assert found is not None
     return found
 
 
 def section_of(show, run, **changed):
     """A section of a run's page."""
-    return supplied(show, Contents(run), run, **changed)
+    return supplied(show, RunContents(run), run, **changed)
 
 
 def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=False, reward_on="state", films=True, **kwargs):
@@ -118,11 +118,11 @@ def path_of(mdp, expert, reward_on):
     found = [FiniteLP(l1=float(l1), reward_on=reward_on).fit(mdp, expert) for l1 in (0.0, *(ends[1:-1] + 0.01 * top))]
     margins = np.stack([certify(mdp, expert, one.reward).margin for one in found])
     rewards = np.stack([one.reward.values for one in found])
-    changes = [{"sentence": f"At price {at:.3g} a reward becomes 0."} for at in ends]
     norms = np.abs(rewards).sum(axis=1)
     return {
         "breakpoints": ends, "rewards": rewards, "margins": margins, "l1_norms": norms,
-        "total_margins": np.nansum(margins, axis=1), "changes": changes,
+        "total_margins": np.nansum(margins, axis=1), "gap": np.array(0.0), "exact": np.array(True),
+        "r_max": np.array(1.0), "margin_cap": np.array(np.nan),
     }  # fmt: skip
 
 

@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 from reports.page.made_runs import table_run, verdict_of
 
-from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
+from irl_gym.reports.comparison.compared_runs import lettered
+from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.comparison.ranked import sentence
 from irl_gym.reports.page.report import write_report
+from irl_gym.runs.supply import supplied
 
 TAXI = {"retrained": (0.82, -139.0, 16.0), "expert": (1.0, 7.8, 0.4), "random": (0.0, -770.0, 15.0)}
 CART = {"retrained": (0.977, 425.0, 17.0), "expert": (1.0, 500.0, None), "random": (0.0, 22.0, 1.5)}
@@ -84,7 +86,7 @@ def test_both_are_of_one_size_and_colour_on_the_page(lake, look, tmp_path_factor
 
 def test_a_comparison_tells_mean_returns_beside_scores(lake, tmp_path):
     runs = [earning(lake, TAXI), earning(lake, TAXI | {"retrained": (0.8, -120.0, 16.0)})]
-    words = sentence(lettered(runs), [])
+    words = supplied(sentence, lettered(runs))
     assert "run A has the best score, 0.820 with mean return -139" in words
     assert "run B the worst, 0.800 with mean return -120. The highest mean return is that of run B, -120." in words
     assert words.endswith("by mean return random actions have -770, the expert 7.8.")
@@ -94,11 +96,11 @@ def test_a_comparison_tells_mean_returns_beside_scores(lake, tmp_path):
 
 def test_agents_of_one_score_are_not_called_equally_good(lake):
     runs = [earning(lake, CART), earning(lake, GREAT)]
-    assert "have one score, 0.977, and mean return 425 to 475" in sentence(lettered(runs), [])
+    assert "have one score, 0.977, and mean return 425 to 475" in supplied(sentence, lettered(runs))
 
 
 def test_each_run_has_its_own_scale_of_returns_where_environments_differ(lake):
     other = earning(lake, CART)
     runs = [earning(lake, TAXI), replace(other, config={**other.config, "gamma": 0.5})]
-    words = sentence(lettered(runs), [])
+    words = supplied(sentence, lettered(runs))
     assert "run A 0.820 with mean return -139 (random actions have -770, the expert 7.8)" in words

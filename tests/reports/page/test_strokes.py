@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from reports.page.made_runs import table_run
 
-from irl_gym.reports.comparison.comparison_page import MOST_RUNS, lettered
+from irl_gym.reports.comparison.compared_runs import lettered
+from irl_gym.reports.comparison.comparison_page import MOST_RUNS
 from irl_gym.reports.comparison.ranked import learning
 from irl_gym.reports.page.sections import training
+from irl_gym.runs.supply import supplied
 
 CSS = (Path(training.__file__).parents[1] / "assets" / "page.css").read_text()
 TO_CONES = np.array([[0.4122, 0.5363, 0.0514], [0.2119, 0.6807, 0.1074], [0.0883, 0.2817, 0.6300]])
@@ -70,7 +72,7 @@ def test_levels_have_colours_and_dashes_that_no_run_has():
 
 def test_curves_whose_colours_come_again_differ_in_dash_and_shape(tmp_path):
     run = table_run(tmp_path, films=False)
-    (panel,) = learning(lettered([run] * 7)).panels
+    (panel,) = supplied(learning, lettered([run] * 7)).panels
     first, again = panel.figure.data[0], panel.figure.data[6]
     assert first.line.color == again.line.color and (first.line.dash, again.line.dash) == ("solid", "9px,3px")
     assert (first.marker.symbol, again.marker.symbol) == ("circle", "square")

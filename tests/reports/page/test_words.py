@@ -7,8 +7,8 @@ import pytest
 from reports.page.made_runs import scene_of, section_of, stepped_run, table_run, verdict_of
 
 from irl_gym.judging.scores import score_of
+from irl_gym.reports.comparison.compared_runs import lettered
 from irl_gym.reports.comparison.comparison_page import write_comparison
-from irl_gym.reports.comparison.shared_worlds import run_places
 from irl_gym.reports.page.sections.absent import absent
 from irl_gym.reports.page.sections.compared import policies, values
 from irl_gym.reports.page.sections.episodes import episodes
@@ -65,9 +65,10 @@ def test_what_is_too_large_is_told_in_a_sentence(need):
 
 
 def test_the_slider_calls_states_as_figures_do(lake):
-    path = {**lake.lambda_path, "changes": [{"sentence": "At price 1 the reward of states 4, 14 becomes 0."}] * 7}
-    data = section_of(lambda_slider, replace(lake, lambda_path=path)).script["slider"]
-    assert data["pieces"][0]["change"] == "At price 1 the reward of (row 1, column 0) and (row 3, column 2) becomes 0."
+    rewards = np.zeros_like(lake.lambda_path["rewards"])
+    rewards[0, [4, 14]] = 0.5
+    data = section_of(lambda_slider, replace(lake, lambda_path={**lake.lambda_path, "rewards": rewards})).script["slider"]
+    assert "the reward of (row 1, column 0) and (row 3, column 2) becomes 0; " in data["pieces"][1]["change"]
 
 
 @pytest.mark.parametrize(
@@ -144,14 +145,14 @@ def test_a_state_is_called_by_more_than_a_number(name, told):
 def test_lakes_of_two_maps_are_told_apart(lake, tmp_path):
     small = table_run(tmp_path / "small", map_name="4x4", films=False)
     plain = replace(lake, config={**lake.config, "env_kwargs": {}})
-    assert run_places({"A": plain, "B": small}) == {"A": "FrozenLake-v1 (no arguments)", "B": "FrozenLake-v1 (map_name=4x4)"}
-    assert run_places({"A": small, "B": small}) == dict.fromkeys("AB", "FrozenLake-v1 (map_name=4x4)")
+    assert lettered([plain, small]).places == {"A": "FrozenLake-v1 (no arguments)", "B": "FrozenLake-v1 (map_name=4x4)"}
+    assert lettered([small, small]).places == dict.fromkeys("AB", "FrozenLake-v1 (map_name=4x4)")
 
 
 def test_a_long_argument_is_told_only_where_runs_differ_in_it(lake):
     drawn = replace(lake, config={**lake.config, "env_kwargs": {"desc": ["SFFFFFFF", "FFFFFFFG"]}})
-    assert run_places({"A": drawn, "B": drawn}) == dict.fromkeys("AB", "FrozenLake-v1")
-    assert run_places({"A": drawn, "B": lake})["A"] == 'FrozenLake-v1 (desc=["SFFFFFFF", "FFFFFFFG"])'
+    assert lettered([drawn, drawn]).places == dict.fromkeys("AB", "FrozenLake-v1")
+    assert lettered([drawn, lake]).places["A"] == 'FrozenLake-v1 (desc=["SFFFFFFF", "FFFFFFFG"])'
 
 
 def test_no_agent_is_best_across_environments(lake, tmp_path):

@@ -35,7 +35,7 @@ def rewards(scene: Scene) -> Section:
 def weights(weights: TabularReward | LinearReward) -> Section:
     """What a reward that is not known state by state is made of."""
     lead = "This environment was stepped, not tabulated, so there is no true reward state by state to compare with. "
-    if not isinstance(weights, LinearReward):
+    if weights.alpha is None:
         return Section("rewards", "Rewards", lead)
     alpha, features = weights.alpha, weights.features
     order = telling(alpha)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from irl_gym.judging.diagnoses.findings import told_answer
+from irl_gym.judging.diagnoses.findings import told_answer, told_finding
 from irl_gym.judging.diagnoses.plain_words import usable_flags
 from irl_gym.judging.estimated import errors_told
 from irl_gym.reports.page.sections.absent import DOCTOR, TABLE
@@ -43,26 +43,26 @@ def whence(recomputed: bool) -> str:
     return "computed again for this page" if recomputed else "the run's own record"
 
 
-def doctor(diagnosis: Mapping[str, Any], worded: Callable[[str], str], given: bool) -> Section:
+def doctor(diagnosis: Mapping[str, Any], place_name: Callable[[int, int | None], str], given: bool) -> Section:
     """The doctor's answer, and findings with their mends."""
-    findings = [finding(one, worded, given=given) for one in diagnosis["findings"]]
+    findings = [finding(one, place_name, given=given) for one in diagnosis["findings"]]
     lead = "What a careful reader would ask of this reward, and what to do about it. " if findings else ""
     lead += f"{told_answer(diagnosis)} {diagnosis['examined']}"
     return Section(*DOCTOR, lead.strip(), (), "doctor", {"findings": findings})
 
 
-def finding(found: Mapping[str, Any], worded: Callable[[str], str], *, given: bool) -> dict[str, str]:
+def finding(found: Mapping[str, Any], place_name: Callable[[int, int | None], str], *, given: bool) -> dict[str, str]:
     """A finding as diagnosis.json holds it, in words: states and actions by their names, and its mend with flags.
 
     Args:
         found: the finding.
-        worded: names the states and actions in a sentence.
+        place_name: what a state is called, or a state and an action.
         given: was a dataset given? Then some flags cannot be.
     """
     mend, flags = found["mend"], usable_flags(found["flags"], given=given)
     return {
         "name": found["name"].replace("-", " "),
-        "sentence": worded(found["sentence"]),
+        "sentence": told_finding(found, place_name),
         "mend": f"{mend} On the command line: {', '.join(flags)}." if flags else mend,
     }
 

@@ -5,7 +5,6 @@ stands for lambda above lambda_0, where R = 0. Everything is worked out here; th
 Axes: S states, A actions, k pieces.
 """
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import ActionSets, StateMask
+from irl_gym.judging.ambiguity.path_changes import Change, changes
 from irl_gym.judging.metrics import optimal_actions
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.planning.dynamic_programming import backup, tied
@@ -35,8 +35,6 @@ NOTHING = 1e-9
 MOST_CELLS = 90_000
 """Pieces times cells of a map that the page holds."""
 BARS = 24
-STATES = re.compile(r"(?<=of )states? (\d+(?:, \d+)*)")
-"""States as the sentences of a path name them, by row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Pieces:
     """(k, S) NaN where the expert is compared with nothing."""
     l1_norms: np.ndarray
     """(k,) ||R||_1."""
-    changes: tuple[str, ...]
+    changes: tuple[Change, ...]
     """(k,) what changes where each begins."""
     of: int
     """Pieces of the whole path."""
@@ -79,47 +77,29 @@ class Pieces:
         k = len(rewards)
         kept = np.unique(np.linspace(0, k - 1, min(k, max(most, 2))).astype(int))
         following = np.append(kept[1:], k)
-        low, high, norms = ends[kept], ends[following], np.asarray(path["l1_norms"], dtype=float)[kept]
-        changes = _sentences(path.get("changes") or (), k)
-        rewards, margins, told = rewards[kept], margins[kept], [changes[i] for i in kept]
+        totals, norms = (np.asarray(path[name], dtype=float) for name in ("total_margins", "l1_norms"))
+        r_max, cap = float(path["r_max"]), float(path["margin_cap"])
+        passed = changes(ends, rewards, margins, totals, norms, r_max=r_max, margin_cap=None if np.isnan(cap) else cap)
+        low, high, norms, rewards, margins = ends[kept], ends[following], norms[kept], rewards[kept], margins[kept]
         low, high, norms = np.append(low, ends[-1]), np.append(high, np.inf), np.append(norms, 0.0)
         rewards = np.concatenate([rewards, np.zeros_like(rewards[:1])])  # above lambda_0 nothing is worth its price
         margins = np.concatenate([margins, np.where(np.isnan(margins[:1]), np.nan, 0.0)])
-        return cls(low, high, rewards, margins, norms, (*told, changes[k]), k)
-
-
-def _sentences(changes: Sequence[Mapping[str, Any]], k: int) -> list[str]:
-    """A sentence for the beginning of each of k pieces, and of R = 0."""
-    told = [str(change.get("sentence", "")) for change in changes]
-    return told if len(told) == k + 1 else [""] * (k + 1)
-
-
-def _named(sentence: str, scene: Scene) -> str:
-    """A sentence with its states called as the figures call them."""
-
-    def called(found: re.Match[str]) -> str:
-        *others, last = (f"({scene.name(int(row))})" for row in found[1].split(", "))
-        return f"{', '.join(others)} and {last}" if others else last
-
-    if not set(re.findall(r"\d+", " ".join(STATES.findall(sentence)))) <= set(map(str, range(scene.mdp.n_states))):
-        return sentence
-    return STATES.sub(called, sentence)
+        return cls(low, high, rewards, margins, norms, tuple(passed[i] for i in (*kept, k)), k)
 
 
 def lambda_slider(scene: Scene, lambda_path: Mapping[str, Any], certificate: Mapping[str, Any]) -> Section:
     """What the optimum is at each price, and at which the run's own reward is."""
     size = scene.place.layout.n_cells if scene.place is not None else 3 * BARS
     pieces = Pieces.of_path(lambda_path, min(MOST_PIECES, MOST_CELLS // size))
-    pieces = replace(pieces, changes=tuple(_named(one, scene) for one in pieces.changes))
     sets = greedy_sets(scene, pieces.rewards)
     shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
     data = {
         "start": _own(pieces, certificate["proof"].get("l1")),
-        "pieces": [_told(pieces, i) for i in range(len(pieces.low))],
+        "pieces": [_told(pieces, i, scene) for i in range(len(pieces.low))],
         "figures": {panel.name: changing for panel, changing in shown},
     }
     thinned = "" if pieces.of <= len(pieces.low) else f" Of {pieces.of:,} pieces, {len(pieces.low) - 1:,} are shown."
-    if not lambda_path.get("exact", True):
+    if not lambda_path["exact"]:
         more = number(float(lambda_path["gap"]), 2)
         stopped = not lambda_path.get("whole", lambda_path["exact"])
         thinned += (
@@ -159,7 +139,7 @@ def _own(pieces: Pieces, l1: Any) -> int:
     return max(int(np.searchsorted(pieces.low, at)) - 1, 0)
 
 
-def _told(pieces: Pieces, i: int) -> dict[str, str]:
+def _told(pieces: Pieces, i: int, scene: Scene) -> dict[str, str]:
     """The words at a position."""
     high = pieces.high[i]
     span = f"{number(pieces.low[i])} to {number(high)}" if np.isfinite(high) else f"above {number(pieces.low[i])}"
@@ -174,7 +154,7 @@ def _told(pieces: Pieces, i: int) -> dict[str, str]:
         "margins": f"{with_margin:,} of {judged:,}",
         "paid": f"{paid:,}",
         "colours": "this piece" if pieces.faint[i] else "all pieces",
-        "change": pieces.changes[i],
+        "change": pieces.changes[i].sentence(scene.place_name),
     }
 
 

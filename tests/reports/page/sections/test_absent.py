@@ -8,6 +8,7 @@ import pytest
 from reports.page.made_runs import NO_CURVE, stepped_run, table_run
 
 from irl_gym.reports.page import report
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.report import sections_of
 from irl_gym.reports.page.sections.absent import LACKS
 from irl_gym.reports.page.sections.section import Section
@@ -32,12 +33,13 @@ def run(tmp_path_factory):
 def test_a_section_that_is_absent_says_why(run, tmp_path, need):
     changes, name, told = WITHOUT[need]
     of = stepped_run(tmp_path) if need == "told_of_table" else replace(run, **changes)
-    (section,) = (one for one in sections_of(of) if one.name == name)
+    (section,) = (one for one in sections_of(RunContents(of), of) if one.name == name)
     assert told in section.lead and not section.panels and not section.shown
 
 
 def test_a_run_without_a_table_has_no_sections_of_states(tmp_path):
-    names = [one.name for one in sections_of(stepped_run(tmp_path))]
+    of = stepped_run(tmp_path)
+    names = [one.name for one in sections_of(RunContents(of), of)]
     assert names == [
         "summary", "rewards", "learning", "episodes", "certificate", "doctor", "table", "stages", "asked", "reproduce",
     ]  # fmt: skip
@@ -48,5 +50,5 @@ def test_a_section_that_is_added_to_the_list_is_shown_with_what_it_needs(run, mo
         return Section("weather", "Weather", f"gamma {config['gamma']}, {len(actions)} actions")
 
     monkeypatch.setattr(report, "SECTIONS", (*report.SECTIONS, weather))
-    *_, last = sections_of(run)
+    *_, last = sections_of(RunContents(run), run)
     assert (last.name, last.lead) == ("weather", f"gamma {run.config['gamma']}, 4 actions")

@@ -46,13 +46,14 @@ def test_the_verdict_says_why_there_is_no_score(tmp_path):
 
 def test_the_doctors_mends_name_their_flags(tmp_path):
     run = table_run(tmp_path, films=False)
-    found = {"name": "ties", "sentence": "Tied in s=6 a=2.", "mend": "Capped.", "flags": ["--margin-cap auto", "--l1 0"]}
+    found = {"name": "ties", "sentence": "Tied in {where}.", "mend": "Capped.", "flags": ["--margin-cap auto", "--l1 0"]}
+    found |= {"states": [6], "actions": []}
     diagnosis = {"answer": "findings", "why": None, "examined": "", "findings": [found]}
     (told,) = section_of(doctor, replace(run, diagnosis=diagnosis)).shown["findings"]
     assert told["mend"] == "Capped. On the command line: --margin-cap auto, --l1 0."
 
 
 def test_the_doctors_sentences_name_states_and_actions(tmp_path):
-    found = {"name": "ties", "sentence": "Tied in s=6 a=2.", "mend": "Cap.", "states": [6], "flags": []}
-    told = finding(found, table_run(tmp_path, films=False).worded, given=False)
+    found = {"name": "ties", "sentence": "Tied in {where}.", "mend": "Cap.", "states": [6], "actions": [2], "flags": []}
+    told = finding(found, table_run(tmp_path, films=False).place_name, given=False)
     assert told == {"name": "ties", "sentence": "Tied in s=6 a=2 (row 1, column 2; right).", "mend": "Cap."}

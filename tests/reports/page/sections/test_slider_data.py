@@ -82,10 +82,16 @@ def test_what_is_counted_as_no_reward_is_drawn_as_0(run):
 
 
 def test_several_states_are_told_with_commas_and_one_and(run):
-    changes = [{"sentence": "At price 1 the reward of states 1, 2, 3 becomes 0; that of state 4 falls."}] * 7
-    _, data = slider_of(run, changes=changes)
-    told = "(row 0, column 1), (row 0, column 2) and (row 0, column 3) becomes 0; that of state (row 1, column 0) falls."
-    assert data["pieces"][0]["change"].endswith(told.replace("state (", "("))
+    rewards = np.zeros_like(run.lambda_path["rewards"])
+    rewards[0, [1, 2, 3]] = 0.5
+    _, data = slider_of(run, rewards=rewards)
+    told = "the reward of (row 0, column 1), (row 0, column 2) and (row 0, column 3) becomes 0; "
+    assert told in data["pieces"][1]["change"]
+
+
+def test_what_changes_is_worked_out_from_the_rewards_and_no_sentence_of_the_file(run):
+    _, data = slider_of(run, changes=[{"sentence": "FORGED"}] * 7)
+    assert all(piece["change"].startswith("At price") for piece in data["pieces"])
 
 
 def test_the_slider_starts_at_the_run_s_own_price(tmp_path):

@@ -85,11 +85,18 @@ class _Part(Proof, total=False):
 Part = Annotated[_Part, AfterValidator(_together), AfterValidator(_gaps)]
 
 
+class Proved(TypedDict):
+    """What a learner proves, of `Outcome.proved`."""
+
+    terms: Part
+    own: dict[str, Any]
+
+
 class Certificate(TypedDict):
     """certificate.json, of `certificates.certificate_of`, but for its facts, which `facts.facts_of` reads."""
 
     optimality: Part | None
-    proof: Part
+    proof: Proved
 
 
 class _Rewarded(Proof):

@@ -102,7 +102,7 @@ def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, ce
     if why is not None:
         return {"no_ambiguity": why}
     told, arrays = {}, {}
-    path = partial(_path, margin_cap=certificate["proof"].get("margin_cap"))
+    path = partial(_path, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
     for name, examine in (("widths", _widths), ("path", path)):
         try:
             found = examine(learner, mdp, known_expert)

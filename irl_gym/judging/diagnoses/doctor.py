@@ -103,7 +103,7 @@ def doctor(
         mdp,
         None if mdp is None else expert,
         None if reward is None or mdp is None else as_tabular(reward, mdp, states),
-        {} if learned is None else learned.proof.to_json(),
+        {} if learned is None else learned.proved()["terms"],
         None if learned is None else learned.status,
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),

@@ -63,6 +63,7 @@ class Proof(TypedDict, total=False):
     n_features: Count
     rank: Count
     trivial: Count
+    left_out: Count
 
 
 class _Part(Proof, total=False):
@@ -77,6 +78,7 @@ class _Part(Proof, total=False):
     marginless: list[Count]
     unbreakable: list[Count]
     unconstrained: list[Count]
+    undecided: list[Count]
     unknown: list[Count]
     unsettled: list[Count]
     violated: list[Count]
@@ -111,6 +113,7 @@ class _Rewarded(Proof):
     marginless_states: NotRequired[Count]
     unbreakable_states: NotRequired[Count]
     unconstrained_states: NotRequired[Count]
+    undecided_states: NotRequired[Count]
     unknown_states: NotRequired[Count]
     unsettled_states: NotRequired[Count]
     violated_states: NotRequired[Count]

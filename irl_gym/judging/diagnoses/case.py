@@ -49,6 +49,8 @@ class Rows:
     """(n,) they are within this of the exact ones."""
     none: np.ndarray
     """(n,) a margin or a violation up to this is none."""
+    tied: np.ndarray
+    """(n,) rows whose margin is none, and no violation: not those that rounding hides."""
     usable: np.ndarray
     """(n,) rows that a reward of this kind can give a margin."""
     errors: np.ndarray
@@ -63,11 +65,6 @@ class Rows:
     def violated(self) -> np.ndarray:
         """(n,) rows that are violated for certain."""
         return self.violations - self.unsure > self.none
-
-    @property
-    def tied(self) -> np.ndarray:
-        """(n,) rows whose margin is none, and no violation."""
-        return np.abs(self.margins) <= self.none
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +127,7 @@ class Case:
 
     @cached_property
     def known(self) -> StateMask:
-        """(S,) where the expert is known; nowhere without a table or an expert."""
+        """(S,) where the expert is known."""
         return np.zeros_like(self.acting) if self.mdp is None or self.expert is None else self._completed[1]
 
     @cached_property
@@ -201,7 +198,7 @@ class Case:
             part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
         nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
-        margins = Margins(nothing, nothing, nothing, nothing)
+        margins = Margins(*[nothing] * 4, *[nothing > 0] * 2, nothing)
         if self.reward is not None:
             found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
             # What follows an unknown state is worth what acting best is, as in `optimality`.
@@ -209,7 +206,8 @@ class Case:
             margins = margins_of(found, c) if taken else best_margins(found, c)
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
-        usable, values = ~c.equal & (~c.trivial | (not self.on_states)), (margins.values, margins.unsure, margins.none)
+        usable = ~c.equal & (~c.trivial | (not self.on_states))
+        values = margins.values, margins.unsure, margins.none, margins.tied
         return Rows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, *values, usable, errors)
 
     @property

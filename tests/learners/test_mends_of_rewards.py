@@ -30,7 +30,7 @@ from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.learners.problem import Oracle, Problem
+from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.learners.registry import learner_class
 from irl_gym.mdp.episodes import Episode, collect
 from irl_gym.mdp.optimality import certify
@@ -201,6 +201,8 @@ CASES = [
      lambda: feasible_widths(ASIDE, np.zeros(3, int), **STEPS)),
     ("values overflow. Scale it.", lambda: policy_iteration(MODEL.mdp, np.full((5, 3), 1e308)),
      lambda: policy_iteration(MODEL.mdp, np.ones((5, 3)))),
+    ("`Problem.of(table, ...)` takes the table's own.",
+     lambda: Problem(Spaces(spaces.Discrete(9), spaces.Discrete(3)), dynamics=MODEL.mdp), lambda: Problem.of(MODEL.mdp)),
     ("Divide it by its largest number: the answer is the same, in other units.",
      lambda: certify(MODEL.mdp, MODEL.expert, HUGE), lambda: certify(MODEL.mdp, MODEL.expert, HUGE / np.abs(HUGE).max())),
     # distances

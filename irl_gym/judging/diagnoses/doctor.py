@@ -143,7 +143,7 @@ def _examined(case: Case) -> str:
     """What was looked at."""
     if case.mdp is None:
         return f"Examined: what the learner proved{', and what episodes showed' if case.judged else ''}."
-    where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
+    where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma}"
     where += ", on a counted table" if case.counted else ""
     beyond = case.beyond.copy()
     if case.rows is None or not beyond.any():

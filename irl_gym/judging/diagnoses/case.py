@@ -198,7 +198,7 @@ class Case:
             part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
         nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
-        margins = Margins(*[nothing] * 4, *[nothing > 0] * 2, nothing)
+        margins = Margins(nothing, nothing, nothing, nothing, nothing > 0, nothing > 0, nothing)
         if self.reward is not None:
             found = optimum(as_compared(part, c, self.on_states), self.reward.of_rows(keep))
             # What follows an unknown state is worth what acting best is, as in `optimality`.

@@ -52,6 +52,17 @@ def checked_number(
     return number
 
 
+def checked_flag(name: str, value: Any) -> bool:
+    """Return True or False, NumPy's too, as a bool.
+
+    Raises:
+        InvalidParameter: anything else, such as a word or a number.
+    """
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise InvalidParameter(f"{name} is {value!r:.80}: expected True or False.")
+
+
 def is_word(value: Any, *words: str) -> bool:
     """Is this one of some words? Arrays, which compare with text one by one, are none."""
     return isinstance(value, str) and value in words

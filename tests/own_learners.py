@@ -15,7 +15,7 @@ from irl_gym.programs.status import Status
 
 @dataclass(frozen=True)
 class Told:
-    """A proof of nothing but what was done."""
+    """A proof of nothing but what was done, with entries that the library calls by the same names and means otherwise."""
 
     sides: int
     objective: float = 0.0
@@ -25,7 +25,8 @@ class Told:
         return (Fact("dice", f"thrown with {self.sides} sides"),)
 
     def to_json(self):
-        return {"sides": self.sides}
+        clash = {"states": "all", "margin_cap": "none", "gaps": ["wide"], "facts": 7, "learner": [], "degenerate": "a little"}
+        return {"sides": self.sides, **clash}
 
 
 @dataclass(frozen=True)

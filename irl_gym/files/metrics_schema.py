@@ -63,6 +63,7 @@ class RewardEntries(TypedDict, total=False):
     n_features: Count
     rank: Count
     trivial: Count
+    left_out: Count
 
 
 class _Part(RewardEntries, total=False):
@@ -77,6 +78,7 @@ class _Part(RewardEntries, total=False):
     marginless: list[Count]
     unbreakable: list[Count]
     unconstrained: list[Count]
+    undecided: list[Count]
     unknown: list[Count]
     unsettled: list[Count]
     violated: list[Count]
@@ -85,11 +87,18 @@ class _Part(RewardEntries, total=False):
 CertificatePart = Annotated[_Part, AfterValidator(_together), AfterValidator(_gaps)]
 
 
+class Proved(TypedDict):
+    """What a learner proves, of `Outcome.proved`."""
+
+    terms: CertificatePart
+    own: dict[str, Any]
+
+
 class Certificate(TypedDict):
     """certificate.json, of `certificates.certificate_of`, but for its facts, which `facts.facts_of` reads."""
 
     optimality: CertificatePart | None
-    proof: CertificatePart
+    proof: Proved
 
 
 class _Rewarded(RewardEntries):
@@ -104,6 +113,7 @@ class _Rewarded(RewardEntries):
     marginless_states: NotRequired[Count]
     unbreakable_states: NotRequired[Count]
     unconstrained_states: NotRequired[Count]
+    undecided_states: NotRequired[Count]
     unknown_states: NotRequired[Count]
     unsettled_states: NotRequired[Count]
     violated_states: NotRequired[Count]

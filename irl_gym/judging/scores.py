@@ -65,7 +65,7 @@ class Scale:
             )
         if self.rounding and abs(self.expert - self.random) <= self.rounding:
             return (
-                f"at gamma {self.gamma:g} the values of the expert, {self.expert:.3g}, and of random actions, "
+                f"at gamma {self.gamma} the values of the expert, {self.expert:.3g}, and of random actions, "
                 f"{self.random:.3g}, are the same but for rounding; a larger gamma may tell them apart"
             )
         return None if self.expert > self.random else "the expert earns no more than random actions"

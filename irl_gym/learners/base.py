@@ -19,7 +19,11 @@ from irl_gym.programs.solvers import Status, check_solving
 
 @runtime_checkable
 class Proof(Protocol):
-    """What every learner says of its program, or of what it did; each says more."""
+    """What every learner says of its program, or of what it did; each says more.
+
+    The library's own say in `known` that the entries of `to_json` are those that it reads by name. Of any other proof they are
+    kept in a place of their own, whatever they are called.
+    """
 
     def facts(self) -> tuple[Fact, ...]:
         """What it says, in sentences."""
@@ -72,6 +76,12 @@ class Outcome(Generic[AnyReward, AnyProof]):
         label = "status" if self.status is Status.LEARNED else "status of the program"
         told = Fact(label, self.status.sentence.removesuffix("."), moods.get(self.status, "bad"))
         return (told, *self.proof.facts())
+
+    def proved(self) -> dict[str, Any]:
+        """What a certificate keeps of the proof: its facts, the terms that are read by name, and entries of another's own."""
+        told, known = self.proof.to_json(), getattr(self.proof, "known", False)
+        facts = [one.to_json() for one in self.facts()]
+        return {"facts": facts, "terms": told if known else {}, "own": {} if known else told}
 
     def record(self) -> dict[str, Any]:
         """What a run's folder keeps beside the reward and the certificate, as json holds it: NaN becomes None."""

@@ -25,11 +25,11 @@ from irl_gym.checks import checked_number
 from irl_gym.demonstrations.demonstrated import most_frequent, visits
 from irl_gym.environments.generative import GenerativeModel
 from irl_gym.errors import InvalidMDP, InvalidParameter, MissingPart
-from irl_gym.features.feature_maps import FeatureMap
+from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
-from irl_gym.mdp.policies import Policy
-from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.policies import Policy, as_distribution, completed
+from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount
 from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.tabulation import Tabulation
@@ -96,6 +96,8 @@ class Problem:
     Raises:
         InvalidMDP, InvalidParameter: dynamics or environment that are none, or discounts that differ.
         InvalidDiscount: gamma outside (0, 1).
+        InvalidPolicy, InvalidReward, InvalidFeatures: beside a table, an expert, a reward or features of another one. Episodes
+            of another are refused by `seen`, which numbers them.
     """
 
     spaces: Spaces
@@ -138,6 +140,24 @@ class Problem:
             raise InvalidParameter(f"the problem has several discounts, {said}: expected one. Make its parts with the same.")
         if self.horizon is not None:
             checked_number("horizon", self.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+        if isinstance(self.dynamics, TabularMDP):
+            self._check_parts(self.dynamics)
+
+    def _check_parts(self, mdp: TabularMDP) -> None:
+        """Check that all that is told row by row is of this table."""
+        for space, n, what in (
+            (self.spaces.observations, mdp.n_states, "state"),
+            (self.spaces.actions, mdp.n_actions, "action"),
+        ):
+            if isinstance(space, spaces.Discrete) and space.n != n and (what == "action" or self.spaces.states is None):
+                told = f"{what}s are numbered by {space}, and the table has {n}: expected one number for each."
+                raise InvalidParameter(f"{told} `Problem.of(table, ...)` takes the table's own.")
+        if self.expert is not None and not isinstance(self.expert, Policy):
+            as_distribution(completed(self.expert, mdp.n_states)[0], mdp.n_states, mdp.n_actions)
+        if self.reward is not None:
+            as_reward(self.reward).expected(mdp)
+        if isinstance(self.features, np.ndarray):
+            check_length(as_features(self.features), mdp.n_states)
 
     @classmethod
     def of(cls, dynamics: TabularMDP | Tabulation, **parts: Any) -> "Problem":

@@ -100,7 +100,7 @@ def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, ce
     if why is not None:
         return {"no_ambiguity": why}
     told, arrays = {}, {}
-    path = partial(_path, margin_cap=certificate["proof"].get("margin_cap"))
+    path = partial(_path, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
     for name, examine in (("widths", _widths), ("path", path)):
         try:
             found = examine(learner, mdp, known_expert)
@@ -115,6 +115,9 @@ def _too_much(learner: Any, mdp: TabularMDP) -> str | None:
     """Why the feasible set is not examined; None where it is."""
     if not getattr(learner, "of_feasible_set", False):
         return f"{type(learner).__name__} does not say that its reward is one of the feasible set"
+    for name, what in (("r_max", "the bound on its rewards"), ("reward_on", '"state" or "state-action"')):
+        if not hasattr(learner, name):
+            return f"{type(learner).__name__} says that its reward is one of the feasible set, and has no {name}, {what}"
     n = int((mdp.reachable & ~mdp.terminal).sum())
     steps = n * mdp.n_actions if learner.reward_on == "state-action" else 0
     if n > MOST_STATES:

@@ -145,7 +145,7 @@ def retrained_agent(
     certificate: Mapping[str, Any], report_progress: OnProgress,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
-    paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"].get("margin_cap"))
+    paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
     glances = Glances(world, _share(report_progress, "agent", retrainer))
     log = folder / LOGS / "retrained"
     policy = world.train(logged(retrainer, log), paid, glances.see)

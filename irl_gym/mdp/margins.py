@@ -1,7 +1,8 @@
 """What each row of (4) is worth under a reward, and how sure that is (Ng & Russell 2000, section 3.1).
 
 A row is decided by itself: it holds, is violated, or is neither for certain; a margin counts beyond the rounding of the table's
-own numbers and what the solver of R left open. Axes: S states, A actions, n rows of (4).
+own numbers and what the solver of R left open. Near gamma = 1 so many steps pay for a difference that this rounding hides what
+matters: then what is within it is not known, and not called a tie. Axes: S states, A actions, n rows of (4).
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,9 @@ from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.planning.howard import Optimum
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
+
+TIE = 1e-8
+"""Share of the terms of a difference, times 1 - gamma, up to which it is none: a hundredth of what decides over all steps."""
 
 
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
@@ -55,6 +59,12 @@ class Margins:
     """(n,) they are within this of the exact ones, on a counted table of those of the same later values."""
     none: np.ndarray
     """(n,) a margin or a violation up to this is none: the rounding of the table's numbers, and what the solver of R left."""
+    rounding: np.ndarray
+    """(n,) what of `unsure` is rounding."""
+    same: np.ndarray
+    """(n,) the two actions are equally good, to rounding of the table's numbers that comes to nothing over all steps."""
+    tied: np.ndarray
+    """(n,) or to that and what the solver of R left open."""
     worth: Vector
     """(S,) what arriving in a state is worth: the margins are differences of its means."""
 
@@ -65,6 +75,11 @@ class Margins:
     def violated(self, equal: np.ndarray) -> np.ndarray:
         """(n,) rows that are violated for certain."""
         return self.violations(equal) - self.unsure > self.none
+
+    @property
+    def positive(self) -> np.ndarray:
+        """(n,) rows with a margin, all rounding included."""
+        return self.values - self.rounding > self.none
 
     def hold(self, equal: np.ndarray) -> np.ndarray:
         """(n,) rows that hold for certain."""
@@ -114,8 +129,8 @@ class JudgedRows:
 
     @property
     def tied(self) -> np.ndarray:
-        """(n,) rows whose margin is none, and no violation."""
-        return np.abs(self.margins) <= self.none
+        """(n,) rows whose margin is none, and no violation: not those that rounding hides."""
+        return self.found.tied
 
 
 def margins_under(mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, *, best: bool) -> tuple[Optimum, Margins]:
@@ -137,7 +152,8 @@ def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
     """The same where everybody acts best afterwards: Q*(s, pi) - Q*(s, a)."""
     (gap, wide), mine = found.gaps, comparisons.distribution
     gap = gap - (mine * gap).sum(axis=1, keepdims=True)
-    return _margins(found, comparisons, gap, wide + (mine * wide).sum(axis=1, keepdims=True), found.V, None)
+    own = np.multiply(mine, wide, out=np.zeros_like(wide), where=mine > 0)  # a bound may be infinite
+    return _margins(found, comparisons, gap, wide + own.sum(axis=1, keepdims=True), found.V, None)
 
 
 def _margins(
@@ -148,4 +164,7 @@ def _margins(
     worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
     moved = ~(comparisons.trivial & reward.on_states)  # the others are 0 whatever the reward
     noise = 0.0 if comparisons.sampling is None else comparisons.sampling.of_margins(worth)
-    return Margins(values[at] * moved, unsure[at] * moved + noise, found.level[at] + left, worth)
+    margins, rounding, level = values[at] * moved, np.where(moved, unsure[at], 0.0), found.level[at]
+    nothing = TIE * (1 - found.table.mdp.gamma) * found.advantages.size[at]
+    same, tied = ((np.abs(margins) <= np.minimum(level, nothing) + more) & (rounding <= nothing) for more in (0.0, left))
+    return Margins(margins, rounding + noise, level + left, rounding, same, tied, worth)

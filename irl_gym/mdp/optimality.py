@@ -2,7 +2,9 @@
 
 Recomputed from P, the expert and R alone: what the best policy earns more (`loss`), and row by row whether (4) of Ng & Russell
 (2000) holds. A violation or a margin counts beyond its own rounding and what the solver of R left open
-(`TabularReward.tolerance`). The margin of a row is how much more the expert's action is worth than another, Q(s, pi) - Q(s, a),
+(`TabularReward.tolerance`); what is within these and no tie over all steps is undecided. All is worked out in units of the
+largest |R|, to which values are in proportion.
+The margin of a row is how much more the expert's action is worth than another, Q(s, pi) - Q(s, a),
     where the expert goes on     if it is known in every state and taken at its word: (4), with V = (I - gamma P_pi)^-1 R (5)
     where one acts best          if it is not known in some state, or errs: then nothing is made up of what it does later
 What a learner's program says of a reward, its terms, its gap and its bound, is the learner's proof.
@@ -10,18 +12,18 @@ Axes: S states, A actions, n rows of (4) among the reachable states.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from irl_gym._typing import Indices, Numbers, Vector
-from irl_gym.checks import any_array
-from irl_gym.errors import InvalidParameter
+from irl_gym.checks import checked_flag
+from irl_gym.errors import InvalidReward
 from irl_gym.facts import Fact, aligned, counted, plain
-from irl_gym.mdp.loss import AT_STAKE, loss_on, told_loss
+from irl_gym.mdp.loss import AT_STAKE, Loss, loss_on, told_loss
 from irl_gym.mdp.margins import Margins, comparable, least_per_state, margins_under
-from irl_gym.mdp.optimality_rows import Comparisons, compare
+from irl_gym.mdp.optimality_rows import Comparisons, compare, left_out
 from irl_gym.mdp.policies import as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import counted_table
@@ -52,6 +54,8 @@ class Optimality:
     margin: Vector
     """(S,) smallest margin of the expert over another action, of the rows of (4) that R can move and that were not given as
     unbreakable; NaN where there is none."""
+    left_out: int
+    """Rows of (4) that margins and ties leave out as unbreakable, on the word of who gave them."""
     constant: bool
     """Does R have the same value everywhere? Where episodes end it may prefer much: see `degenerate`."""
     zero: bool
@@ -63,7 +67,10 @@ class Optimality:
     inseparable: Indices
     """Reachable states where a reward on states leaves the expert tied with an action of equal successors; none for R(s, a)."""
     marginless: Indices
-    """Reachable states with rows but without a positive margin under R: tied or violated."""
+    """Reachable states with rows but without a positive margin under R: tied, violated or undecided."""
+    undecided: Indices
+    """Reachable states in which rounding, or what the counts or the solver of R left open, hides whether another action is
+    better, none certainly being so."""
     violated: Indices
     """States with a violated row of (4)."""
     violated_rows: np.ndarray
@@ -86,7 +93,7 @@ class Optimality:
     @property
     def tied(self) -> Indices:
         """Reachable states in which another action is as good as the expert's, to rounding, and none is better."""
-        return np.setdiff1d(self.marginless, self.violated)
+        return np.setdiff1d(self.marginless, np.union1d(self.violated, self.undecided))
 
     def facts(self) -> tuple[Fact, ...]:
         """All of this, in sentences."""
@@ -107,7 +114,8 @@ class Optimality:
         finite = self.margin[np.isfinite(self.margin)]
         span = f"{finite.min():.3g} to {finite.max():.3g} in {counted(finite.size)}" if finite.size else "none"
         later = "one acts best" if self.errs or self.unknown.size else "the expert goes on"
-        yield Fact("margins", f"{span}: how much better the expert's action is than the next, where {later} afterwards")
+        out = f"; {counted(self.left_out, 'row')} of (4) given as unbreakable left out" if self.left_out else ""
+        yield Fact("margins", f"{span}: how much better the expert's action is than the next, where {later} afterwards{out}")
 
     def _of_states(self) -> Iterator[Fact]:
         if self.violated.size:
@@ -115,6 +123,9 @@ class Optimality:
         if self.tied.size and not self.zero:
             told = f"in {counted(self.tied.size)} another action is as good as the expert's to rounding, and none better"
             yield Fact("tied", told, "open")
+        if self.undecided.size:
+            told = f"in {counted(self.undecided.size)} no action is certainly better than the expert's, and one may be"
+            yield Fact("undecided", f"{told}: what rounding and all later steps leave open is more than the difference", "open")
         if self.unsettled.size:
             yield Fact("left open by the counts", f"{unsettled_told(self.unsettled.size)}; more steps to count tell", "open")
         if self.inseparable.size:
@@ -177,39 +188,62 @@ def certify(
     Raises:
         InvalidMDP: something else than a table.
         InvalidPolicy: an expert of the wrong shape or content.
-        InvalidReward: a reward of the wrong shape.
-        InvalidParameter: rows that the table does not have.
+        InvalidReward: a reward of the wrong shape, or one so large that what it is worth is no float64.
+        InvalidParameter: `errs` that is neither True nor False, or rows that the table does not have.
     """
-    mdp, reward = checked_mdp(mdp), as_reward(reward)
+    mdp, reward, errs = checked_mdp(mdp), as_reward(reward), checked_flag("errs", errs)
     reward.expected(mdp)  # checks the shape
     policy, known = completed(expert, mdp.n_states)
     distribution = as_distribution(policy, mdp.n_states, mdp.n_actions)
     rows = np.flatnonzero(mdp.reachable)
-    part, R = mdp.restrict(rows), reward.of_rows(rows)
+    part, (R, unit) = mdp.restrict(rows), reward.of_rows(rows).in_units()
     unknown = ~known[rows] & ~part.terminal
     c = compare(part, distribution[rows], np.flatnonzero(~unknown))
     best = errs or bool(unknown.any())
     found, margins = margins_under(part, c, R, best=best)
     loss = loss_on(part, found, c.distribution, unknown)
+    if margins.same.all() and not unknown.any() and found.table.mdp is part:  # else the counts leave it open
+        loss = replace(loss, tied=True)
     paid = R.values if R.on_states else R.values[~part.terminal]
-    largest = float(np.abs(paid).max(initial=0.0))
+    largest = float(np.abs(paid).max(initial=0.0))  # in units
+    told = _of_rows(mdp, rows, c, R, margins, unknown, c.equal & (not best), left_out(mdp, rows, c, unbreakable), loss)
+    in_values = {"loss_low": loss.low, "loss_bound": loss.high, "at_stake": loss.scale_high, **told}
     return Optimality(
+        **{name: _in_values(one, unit, largest, mdp) if name in VALUES else one for name, one in in_values.items()},
         expert_optimal=loss.optimal,
-        loss_low=loss.low,
-        loss_bound=loss.high,
         loss_share=loss.share,
-        at_stake=loss.scale_high,
         errs=errs,
         constant=not paid.size or bool(np.ptp(paid) <= ROUNDING * largest),
         zero=largest == 0.0,
         unknown=rows[unknown],
-        **_of_rows(mdp, rows, c, R, margins, unknown, c.equal & (not best), _left_out(mdp, rows, c, unbreakable)),
     )
+
+
+VALUES = ("loss_low", "loss_bound", "at_stake", "worst_violation", "margin", "violations", "sampling_error")
+"""What is in units of value."""
+
+
+def _in_values(one: Any, unit: int, largest: float, mdp: TabularMDP) -> Any:
+    """A number, or an array, in units of 2^unit as it is, where the largest |R| is `largest`.
+
+    Raises:
+        InvalidReward: it is no float64.
+    """
+    if one is None:
+        return None
+    with np.errstate(over="ignore"):
+        found = np.ldexp(one, unit)
+    if (np.isinf(found) & np.isfinite(one)).any():
+        raise InvalidReward(
+            f"the reward is up to {np.ldexp(largest, unit):.3g}, and at gamma {mdp.gamma} what it is worth is no float64 "
+            "number: expected a smaller one. Divide it by its largest number: the answer is the same, in other units."
+        )
+    return found if isinstance(one, np.ndarray) else float(found)
 
 
 def _of_rows(
     mdp: TabularMDP, rows: Indices, c: Comparisons, R: TabularReward, margins: Margins, unknown: np.ndarray, equal: np.ndarray,
-    left_out: np.ndarray,
+    without: np.ndarray, loss: Loss,
 ) -> dict[str, Any]:  # fmt: skip
     """What the rows of (4) say, each by itself.
 
@@ -221,17 +255,21 @@ def _of_rows(
         margins: of each row.
         unknown: (r,) states without rows, as nothing is known of the expert.
         equal: (n,) rows that are violated to either side.
-        left_out: (n,) rows that no margin is taken over.
+        without: (n,) rows that no margin is taken over.
+        loss: what the expert loses: a "no" never goes with ties alone, nor a tie of every action with anything else.
     """
     usable = comparable(c, R)
-    kept = usable & ~left_out
+    kept = usable & ~without
     margin = np.full(mdp.n_states, np.nan)
     margin[rows] = least_per_state(margins.values[kept], c.states[kept], rows.size)
     violations = margins.violations(equal)
-    which = np.flatnonzero(margins.violated(equal))
     error, unsettled = None, np.zeros_like(kept)
     if c.sampling is not None:
         error, unsettled = c.sampling.unsettled(margins.values, margins.worth, kept, margins.none)
+    violated = margins.violated(equal)
+    tied = margins.tied if violated.any() or loss.optimal is not False else np.zeros_like(violated)
+    tied = (tied | loss.tied) & ~violated
+    undecided = (kept & ~margins.positive | equal) & ~tied & ~violated
     acting = np.flatnonzero(~unknown & ~mdp.terminal[rows])
 
     def named(chosen: np.ndarray) -> Indices:
@@ -240,26 +278,15 @@ def _of_rows(
     return {
         "worst_violation": float(violations.max(initial=0.0)),
         "margin": margin,
-        "indifferent": bool((np.abs(margins.values) <= margins.none).all()),
+        "left_out": int(without.sum()),
+        "indifferent": bool(tied.all()) and loss.optimal is not False,
         "unconstrained": rows[np.setdiff1d(acting, c.states[usable])],
         "inseparable": named(c.trivial & ~c.equal & R.on_states),
-        "marginless": named(kept & (margins.values <= margins.none)),
-        "violated": named(which),
-        "violated_rows": c.pairs(rows, which),
-        "violations": violations[which],
+        "marginless": named(kept & (~margins.positive | tied)),
+        "undecided": np.setdiff1d(named(undecided), named(violated)),
+        "violated": named(violated),
+        "violated_rows": c.pairs(rows, np.flatnonzero(violated)),
+        "violations": violations[violated],
         "sampling_error": error,
         "unsettled": named(unsettled),
     }
-
-
-def _left_out(mdp: TabularMDP, rows: Indices, c: Comparisons, unbreakable: Any) -> np.ndarray:
-    """(n,) which rows of (4) are among those given as unbreakable."""
-    given = () if unbreakable is None else unbreakable
-    pairs = any_array("unbreakable", given, "(u, 2) states and actions", InvalidParameter)
-    if pairs.size == 0:
-        return np.zeros(c.states.size, dtype=bool)
-    shape = np.array([mdp.n_states, mdp.n_actions])
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu" or not ((pairs >= 0) & (pairs < shape)).all():
-        told = f"{mdp.n_states} states and {mdp.n_actions} actions"
-        raise InvalidParameter(f"unbreakable is {pairs.tolist()!r:.60}: expected (u, 2) whole numbers, of {told}.")
-    return np.isin(rows[c.states] * mdp.n_actions + c.actions, pairs @ np.array([mdp.n_actions, 1]))

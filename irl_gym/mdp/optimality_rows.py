@@ -14,6 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from irl_gym._typing import Indices, Matrix, Sparse
+from irl_gym.checks import any_array
+from irl_gym.errors import InvalidParameter
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.sampling_error import SamplingError, sampling_error
 from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable, entry_rows
@@ -102,3 +104,16 @@ def as_compared(mdp: TabularMDP, comparisons: Comparisons, on_states: bool) -> T
     own = sp.csr_array(mdp.mixing(comparisons.distribution)[comparisons.states[same]])
     place = sp.csr_array((np.ones(pairs.size), (pairs, np.arange(pairs.size))), shape=(mdp.P.shape[0], pairs.size))
     return TabularMDP(sp.csr_array((sp.diags_array(kept) + place @ own) @ mdp.P), mdp.gamma, mdp.d0, mdp.visits)
+
+
+def left_out(mdp: TabularMDP, rows: Indices, c: Comparisons, unbreakable: Any) -> np.ndarray:
+    """(n,) which rows of (4) are among those given as unbreakable."""
+    given = () if unbreakable is None else unbreakable
+    pairs = any_array("unbreakable", given, "(u, 2) states and actions", InvalidParameter)
+    if pairs.size == 0:
+        return np.zeros(c.states.size, dtype=bool)
+    shape = np.array([mdp.n_states, mdp.n_actions])
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu" or not ((pairs >= 0) & (pairs < shape)).all():
+        told = f"{mdp.n_states} states and {mdp.n_actions} actions"
+        raise InvalidParameter(f"unbreakable is {pairs.tolist()!r:.60}: expected (u, 2) whole numbers, of {told}.")
+    return np.isin(rows[c.states] * mdp.n_actions + c.actions, pairs @ np.array([mdp.n_actions, 1]))

@@ -96,6 +96,15 @@ class TabularReward:
         """The same reward on some of the states only, renumbered in the order given."""
         return TabularReward(self.values[rows], self.note, self.tolerance)
 
+    def in_units(self) -> tuple["TabularReward", int]:
+        """The same reward, and its tolerance, in units of 2^k, and k: the largest number is then 1 to 2, and no sum overflows.
+
+        Nothing is rounded but numbers 10^300 times smaller than the largest.
+        """
+        exponent = int(np.frexp(max(float(np.abs(self.values).max()), self.tolerance, np.finfo(float).tiny))[1]) - 1
+        values, tolerance = np.ldexp(self.values, -exponent), float(np.ldexp(self.tolerance, -exponent))
+        return TabularReward(values, self.note, tolerance), exponent
+
     def pay(self, states: Any, actions: Any, next_states: Any) -> Any:
         """The reward of steps (s, a, s'): scalars or arrays (N,) in, the same shape out."""
         return self.values[next_states] if self.on_states else self.values[states, actions]

@@ -76,7 +76,7 @@ def _asked(config: Mapping[str, Any], hidden: Mapping[str, int], out: Path) -> s
     """Where and with which discount it was done, and what the environment was made to do."""
     made = ", ".join(f"{name}={value}" for name, value in config["env_kwargs"].items())
     where = config["env_id"] or f"{_recorded_in(out)}the environment of {config['dataset']}"
-    told = [f"{where} ({made})" if made else where, f"gamma {config['gamma']:g}", f"seed {config['seed']}"]
+    told = [f"{where} ({made})" if made else where, f"gamma {config['gamma']}", f"seed {config['seed']}"]
     if config["start_seeds"]:
         told.append(f"layouts from the seeds {', '.join(map(str, config['start_seeds']))}")
     if hidden:

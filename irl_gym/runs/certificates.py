@@ -1,7 +1,9 @@
 """certificate.json: what a run's reward says of the expert, and what its learner proves of its program, each with its facts.
 
-    {"optimality": {fields, "facts": [...]}, or null where there is no table,    "proof": {fields, "facts": [...]}}
-Whoever reads a run recomputes the optimality from the run's table, expert and reward (`verified`); the proof is its record.
+    {"optimality": {fields, "facts": [...]}, or null where there is no table,
+     "proof": {"facts": [...], "terms": {what is read by name}, "own": {what a learner of somebody's own tells, not read}}}
+Whoever reads a run recomputes the optimality from the run's table, expert and reward (`verified`), and takes nothing of the
+proof for it: which rows a program found unbreakable is its word too, so no row of (4) is left out. The proof is a record.
 """
 
 from collections.abc import Mapping
@@ -30,29 +32,28 @@ def certificate_of(result: Outcome, known: tuple[Tabulation, Any] | None, *, epi
             nothing to say of the expert.
         episodes: is the expert known by its episodes only? Then it may err.
     """
-    proof = {**result.proof.to_json(), "facts": [one.to_json() for one in result.facts()]}
+    proof = result.proved()
     if known is None or result.reward is None:
         return {"optimality": None, "proof": proof}
     table, expert = known
     reward = result.reward.tabular(table.states)
-    found = certified(table, expert, reward, proof, episodes=episodes)
+    found = certified(table, expert, reward, episodes=episodes)
     return {"optimality": optimality_told(found, table), "proof": proof}
 
 
-def certified(table: Tabulation, expert: Any, reward: TabularReward, proof: Mapping[str, Any], *, episodes: bool) -> Optimality:
+def certified(table: Tabulation, expert: Any, reward: TabularReward, *, episodes: bool) -> Optimality:
     """What a run's reward says of its expert.
 
     Args:
         table: the run's.
         expert: as its learner was given it.
         reward: in the table.
-        proof: as json holds it; rows that its program found unbreakable have no margin.
         episodes: is the expert known by its episodes only? Then it may err.
 
     Raises:
-        InvalidPolicy, InvalidReward, InvalidParameter: what does not belong together.
+        InvalidPolicy, InvalidReward: what does not belong together.
     """
-    return certify(table.mdp, expert, reward, errs=episodes, unbreakable=proof.get("unbreakable_rows"))
+    return certify(table.mdp, expert, reward, errs=episodes)
 
 
 def optimality_told(found: Optimality, table: Tabulation) -> dict[str, Any]:
@@ -88,4 +89,5 @@ def facts_in(certificate: Mapping[str, Any]) -> tuple[tuple[Fact, ...], tuple[Fa
 
 def claims_in(certificate: Mapping[str, Any]) -> dict[str, Any]:
     """All that a certificate says, by name: what a table decides is not a sampling learner's to say."""
-    return {key: one for key, one in {**certificate["proof"], **(certificate["optimality"] or {})}.items() if key != "facts"}
+    told = {**certificate["proof"]["terms"], **(certificate["optimality"] or {})}
+    return {key: one for key, one in told.items() if key != "facts"}

@@ -30,7 +30,7 @@ BEST = ("best_round", "best_by")
 """What the algorithm for trajectories tells of its rounds."""
 TRAINED = ("trained_return", "vecnormalize")
 """What `FromFile.trained` says of an expert's training."""
-STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "unknown", "unsettled", "violated")
+STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "undecided", "unknown", "unsettled", "violated")
 """Lists of states in certificates; the metrics count them."""
 
 

@@ -39,7 +39,12 @@ def put(content, to, value):
         ("metrics.json", "reward.status", "splendid", "its reward.status is 'splendid': expected one of optimal, learned"),
         ("metrics.json", "table.states", 16.5, "its table.states is 16.5: expected a whole number"),
         ("certificate.json", "optimality.margin", "wide", "its optimality.margin is 'wide': expected a list"),
-        ("certificate.json", "proof.objective", float("nan"), "it is no json of text and numbers: NaN is no finite number"),
+        (
+            "certificate.json",
+            "proof.terms.objective",
+            float("nan"),
+            "it is no json of text and numbers: NaN is no finite number",
+        ),
         ("config.json", "learner", "FiniteLP", "its learner is 'FiniteLP': expected an object"),
         ("config.json", "seed", ..., "its seed is missing: expected it"),
         ("run.json", "command", [7], "its command.0 is 7: expected a text"),

@@ -30,9 +30,10 @@ from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.learners.problem import Oracle, Problem
+from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.learners.registry import learner_class
 from irl_gym.mdp.episodes import Episode, collect
+from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.policies import TabularPolicy
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -133,6 +134,7 @@ def pearson(groups):
 AGENT = SimpleNamespace(predict=lambda observations: (np.zeros(len(observations), int), None))
 AGAINST = dict(enumerate(-MODEL.R))
 AT_ONE, FEW = {3: 1.0}, {s: AGAINST[s] for s in range(3)}
+HUGE = -1e308 * MODEL.R / np.abs(MODEL.R).max()
 ACTING = ~ENDING.mdp.terminal[:, None]
 EVEN = ACTING / (ACTING.sum() * 3) * np.ones((8, 3))
 ASIDE = TabularMDP.from_dense(
@@ -199,6 +201,10 @@ CASES = [
      lambda: feasible_widths(ASIDE, np.zeros(3, int), **STEPS)),
     ("values overflow. Scale it.", lambda: policy_iteration(MODEL.mdp, np.full((5, 3), 1e308)),
      lambda: policy_iteration(MODEL.mdp, np.ones((5, 3)))),
+    ("`Problem.of(table, ...)` takes the table's own.",
+     lambda: Problem(Spaces(spaces.Discrete(9), spaces.Discrete(3)), dynamics=MODEL.mdp), lambda: Problem.of(MODEL.mdp)),
+    ("Divide it by its largest number: the answer is the same, in other units.",
+     lambda: certify(MODEL.mdp, MODEL.expert, HUGE), lambda: certify(MODEL.mdp, MODEL.expert, HUGE / np.abs(HUGE).max())),
     # distances
     ("Let it follow itself.",
      lambda: epic_bound(ENDING.mdp, *rewards_of(ENDING)),

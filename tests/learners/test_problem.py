@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from irl_gym.errors import InvalidDiscount, InvalidParameter, MissingPart
+from irl_gym.errors import InvalidDiscount, InvalidFeatures, InvalidParameter, InvalidPolicy, InvalidReward, MissingPart
 from irl_gym.learners.needs import PARTS, TO_GET, Needs
 from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.mdp.episodes import Episode
@@ -98,6 +98,28 @@ def test_two_discounts_are_refused(grid):
 def test_a_part_outside_its_range_is_refused(part, error):
     with pytest.raises(error):
         Problem(Spaces(spaces.Discrete(3), spaces.Discrete(2)), **part)
+
+
+@pytest.mark.parametrize(
+    ("part", "error", "told"),
+    [
+        ({"expert": np.zeros(3, dtype=int)}, InvalidPolicy, r"policy has shape \(3,\).*Give one entry for each state"),
+        ({"expert": np.full(16, 9)}, InvalidPolicy, r"is action 9: expected an action from 0 to 3"),
+        ({"reward": TabularReward(np.zeros(3))}, InvalidReward, r"shape \(3,\): expected .*another table's"),
+        ({"features": np.eye(3)}, InvalidFeatures, r"of 3 states: expected 16, one row of phi a state"),
+    ],
+)
+def test_a_part_of_another_table_is_refused(part, error, told):
+    model = models.random_model(0, S=16, A=4)
+    with pytest.raises(error, match=told):
+        Problem.of(model.mdp, **part)
+
+
+@pytest.mark.parametrize(("states", "actions"), [(5, 3), (7, 2)])
+def test_spaces_of_another_table_are_refused(states, actions):
+    mdp = models.random_model(0).mdp
+    with pytest.raises(InvalidParameter, match=r"s are numbered by Discrete\(.\), and the table has ."):
+        Problem(Spaces(spaces.Discrete(states), spaces.Discrete(actions)), dynamics=mdp)
 
 
 def test_the_policy_is_the_experts_where_it_is_known(grid):

@@ -7,14 +7,16 @@ import signal
 import subprocess
 import sys
 
+import models
 import numpy as np
 import pytest
+from own_learners import Dice
 from stopped import HANG
 
 from irl_gym.agents.planners import SB3
 from irl_gym.errors import RunIncomplete
 from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.loop import filming
+from irl_gym.loop import filming, final_stages
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
@@ -98,3 +100,12 @@ def test_drawing_sets_no_variable_that_the_user_has_set_and_leaves_none_behind(m
     with filming._quietly():
         seen = [os.environ["SDL_VIDEODRIVER"], os.environ["SDL_AUDIODRIVER"]]
     assert seen == ["offscreen", "dummy"] and "SDL_AUDIODRIVER" not in os.environ
+
+
+@pytest.mark.parametrize("lacking", ["r_max", "reward_on"])
+def test_a_learner_without_what_its_feasible_set_takes_is_not_examined(tmp_path, lacking):
+    mdp = models.random_model(0).mdp
+    has = {name: one for name, one in (("r_max", 1.0), ("reward_on", "state")) if name != lacking}
+    learner = type("Bold", (Dice,), {"of_feasible_set": True, **has})()
+    told = final_stages.feasible_set(tmp_path, learner, mdp, np.zeros(7, dtype=int), {"proof": {"terms": {}}})
+    assert f"is one of the feasible set, and has no {lacking}," in told["no_ambiguity"]

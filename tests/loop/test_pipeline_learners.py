@@ -146,7 +146,7 @@ def test_a_run_tells_what_the_doctor_finds_in_its_folder(runs, name):
 def test_the_metrics_count_what_the_certificate_lists(runs, name):
     reward, certificate = runs(name).metrics["reward"], runs(name).certificate
     assert not any(isinstance(value, list) for value in reward.values())
-    assert reward["objective"] == certificate["proof"]["objective"]
+    assert reward["objective"] == certificate["proof"]["terms"]["objective"]
     assert (certificate["optimality"] is None) == (name in STEPPED)
     assert ("best_round" in reward) == (name in TRAJECTORIES) and ("worst_tie_regret" in reward) == (name not in STEPPED)
 

@@ -42,7 +42,7 @@ class Case:
     reward: TabularReward | None = None
     """R in the table; None where no reward came out, or there is no table."""
     claims: Mapping[str, Any] = field(default_factory=dict)
-    """What a certificate says, by name (`certificates.claims_in`), or a proof's `to_json()`; empty where there is neither."""
+    """What a certificate says, by name (`certificates.claims_in`), or a proof's terms; empty where there is neither."""
     status: Status | None = None
     """What became of the program; None where there was none, or nothing is known of it."""
     stats: Mapping[str, Any] = field(default_factory=dict)
@@ -91,7 +91,7 @@ class Case:
 
     @cached_property
     def known(self) -> StateMask:
-        """(S,) where the expert is known; nowhere without a table or an expert."""
+        """(S,) where the expert is known."""
         return np.zeros_like(self.acting) if self.mdp is None or self.expert is None else self._completed[1]
 
     @cached_property
@@ -162,7 +162,8 @@ class Case:
             part = TabularMDP(part.P, gamma, part.d0, part.visits)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
         nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
-        margins, either = Margins(nothing, nothing, nothing, nothing), c.equal
+        margins = Margins(nothing, nothing, nothing, nothing, nothing > 0, nothing > 0, nothing)
+        either = c.equal
         if self.reward is not None:
             # As `certify`: what follows an unknown state, or an error, is worth what acting best is.
             best = not self.fully_known or bool(self.claims.get("errs", self.claims.get("slack") is not None))
@@ -174,11 +175,12 @@ class Case:
 
     @property
     def _kept(self) -> np.ndarray:
-        """(n,) rows that a margin is taken over: those that the proof lists as unbreakable are left out one by one."""
-        assert self.rows is not None
-        pairs = np.array(self.claims.get("unbreakable_rows") or np.zeros((0, 2)), dtype=np.int64)
-        n = self.distribution.shape[1]
-        return self.rows.usable & ~np.isin(self.rows.states * n + self.rows.actions, pairs @ np.array([n, 1]))
+        """(n,) rows that a margin is taken over: ties that no reward breaks, as a program finds now, are left out."""
+        rows = self.rows
+        assert rows is not None
+        tied = rows.usable & rows.tied
+        possible = self.can_have_margin if self.speaks and tied.any() else None
+        return rows.usable if possible is None else rows.usable & ~(tied & ~possible[rows.states, rows.actions])
 
     @cached_property
     def least(self) -> Vector:
@@ -226,8 +228,8 @@ class Case:
 
     @cached_property
     def judges_states(self) -> bool:
-        """Does the learner promise margins in states? Not where it compares sampled values of whole policies."""
-        return "gaps" not in self.claims
+        """Does the learner promise margins in states? Not where it compares sampled values of whole policies, by features."""
+        return "gaps" not in self.claims or (self.reward is not None and self.weights is None)
 
     @cached_property
     def linear(self) -> bool:

@@ -103,7 +103,7 @@ def doctor(
         mdp,
         None if mdp is None else expert,
         None if reward is None or mdp is None else as_tabular(reward, mdp, states),
-        {} if learned is None else learned.proof.to_json(),
+        {} if learned is None else learned.proved()["terms"],
         None if learned is None else learned.status,
         {} if learned is None else learned.stats,
         None if true is None or mdp is None else as_reward(true),
@@ -136,7 +136,7 @@ def _examined(case: Case) -> str:
     """What was looked at."""
     if case.mdp is None:
         return f"Examined: what the learner proved{', and what episodes showed' if case.judged else ''}."
-    where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma:g}"
+    where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma}"
     where += ", on a counted table" if case.counted else ""
     beyond = case.beyond.copy()
     if case.rows is None or not beyond.any():

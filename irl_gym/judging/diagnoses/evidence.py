@@ -12,7 +12,7 @@ EvidenceName = Literal["certificate", "metrics", "expert", "reward", "true", "pr
 def lacking(case: Case, needs: Sequence[EvidenceName]) -> str | None:
     """Why the first of some evidence that a case has not is not there, in words; None where all is."""
     told = {
-        "certificate": None if case.claims else "there is no learner's proof",
+        "certificate": None if case.claims else "there is no proof of a program",
         "metrics": None if case.judged else "no finished run judged it",
         **dict.fromkeys(("expert", "reward", "true", "programs"), "there is no table"),
     }

@@ -47,7 +47,7 @@ def _small(case: Case, under: str, vanished: np.ndarray, larger: float) -> Findi
     states = np.flatnonzero(case.acting)[vanished]
     return Finding(
         "small-gamma",
-        f"At gamma = {case.mdp.gamma:g} values vanish on the way: under {under} is below {VANISHED:g} of the largest |R| in "
+        f"At gamma = {case.mdp.gamma} values vanish on the way: under {under} is below {VANISHED:g} of the largest |R| in "
         f"{counted(states.size)}, {vanished.mean():.0%}: {WHERE}.",
         f"A larger gamma: at {larger:g}, with the same reward, it no longer is.",
         states,

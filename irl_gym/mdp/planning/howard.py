@@ -29,6 +29,8 @@ CAREFUL = 1e-10
 WORTHWHILE = 1e-15
 """Share of the same terms below which nothing is improved."""
 LAST_IMPROVEMENTS = 30
+LARGEST = float(np.finfo(np.float64).max) / 64
+"""Values up to this add up without overflow."""
 OUTWARDS = 1e-9
 """Relative width given to bounds for the last operations, on top."""
 
@@ -168,14 +170,13 @@ def howard(mdp: TabularMDP, reward: TabularReward, blocked: np.ndarray, max_iter
         InvalidParameter: `max_iterations` spent.
     """
     R, states, seen = reward.expected(mdp), np.arange(mdp.n_states), set()
-    policy, paid = _warm_start(mdp, R, blocked), np.abs(R)
+    paid = np.abs(R)
+    if paid.max() > LARGEST * (1 - mdp.gamma):
+        raise InvalidReward(f"the reward is up to {paid.max():.3g}, too large at gamma {mdp.gamma}: values overflow. Scale it.")
+    policy = _warm_start(mdp, R, blocked)
     for iteration in range(1, max_iterations + 1):
         discounted = Discounted(mdp.P[states * mdp.n_actions + policy], mdp.gamma)
         V = np.where(mdp.terminal, 0.0, discounted.solve(R[states, policy]))
-        if not np.isfinite(V).all():
-            raise InvalidReward(
-                f"the reward is up to {paid.max():.3g}, too large at gamma {mdp.gamma:g}: values overflow. Scale it."
-            )
         onwards = mdp.gamma * (mdp.P @ np.stack([V, np.abs(V)], axis=1))
         Q = np.where(blocked, -np.inf, R + onwards[:, 0].reshape(R.shape))
         size = paid + onwards[:, 1].reshape(R.shape) + np.abs(V)[:, None]

@@ -18,7 +18,7 @@ from irl_gym.reports.page.sections.section import Section, specs
 from irl_gym.reports.page.sections.verdict import policies_table, verdict
 from irl_gym.runs.run import Run
 from irl_gym.runs.supply import missing, supplied
-from irl_gym.written import number, seconds
+from irl_gym.written import seconds
 
 SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
 STAGES_LEAD = (
@@ -80,7 +80,7 @@ def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | 
     """What stands below the title."""
     told = [
         ("learner", str((config.get("learner") or {}).get("type", "not known"))),
-        ("gamma", number(config.get("gamma"))),
+        ("gamma", str(config.get("gamma"))),  # in full: 1 - 1e-12 is not 1
         ("seed", str(config.get("seed"))),
     ]
     if config.get("env_kwargs"):

@@ -132,7 +132,6 @@ def recomputed(
         InvalidReward: the bounds that are recorded cannot be of this table, expert and reward.
         InvalidDiscount: nor can the discount.
         InvalidPolicy: an expert of the wrong shape or content.
-        InvalidParameter: rows that are recorded as unbreakable are not this table's.
     """
     if config.get("gamma") != table.mdp.gamma:
         raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
@@ -141,7 +140,7 @@ def recomputed(
     except (IrlGymError, OSError):
         return None
     episodes = config.get("dataset") is not None or bool(config.get("epsilon"))
-    now, recorded = certified(table, known, reward, certificate["proof"], episodes=episodes), certificate["optimality"] or {}
+    now, recorded = certified(table, known, reward, episodes=episodes), certificate["optimality"] or {}
     low, high = recorded.get("loss_low"), recorded.get("loss_bound")
     rounding = ROUNDING * now.at_stake
     above, below = math.inf if high is None else high, -math.inf if low is None else low

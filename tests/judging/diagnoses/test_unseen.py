@@ -38,7 +38,8 @@ def test_avoiding_unknown_states_mends_strays():
 
 def test_a_sampled_reward_that_leads_where_the_expert_never_was_is_told():
     claims = sampled().proof.to_json()
-    case = Case(FORK, np.zeros(4, dtype=int), TabularReward(np.array([0.0, 0.0, 1.0, 0.0])), claims)
+    R = np.array([0.0, 0.0, 1.0, 0.0])
+    case = Case(FORK, np.zeros(4, dtype=int), TabularReward(R), claims, weights=R)
     said = strays(case)
     assert said is not None and said.states.tolist() == [2] and "More rounds" in said.mend
 

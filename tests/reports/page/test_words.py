@@ -32,7 +32,7 @@ def cards(tmp_path_factory):
 
 def test_the_feasible_set_is_told_with_its_margin(lake):
     lead = section_of(widths, lake).lead
-    assert "within +-1" in lead and f"at least {lake.certificate['proof']['margin_cap']:.4f}" in lead
+    assert "within +-1" in lead and f"at least {lake.certificate['proof']['terms']['margin_cap']:.4f}" in lead
 
 
 def test_the_margin_has_no_number_where_the_run_had_another_cap(lake):

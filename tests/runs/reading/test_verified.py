@@ -16,8 +16,10 @@ from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import claims_in, facts_in
+from irl_gym.runs.diagnosed import diagnose_run
 from irl_gym.runs.reading.verified import again, claims, recomputed, with_again
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +71,7 @@ def test_what_is_said_of_the_expert_is_computed_and_not_read(unvouched, run):
 
 
 def test_on_a_table_its_word_counts_more_than_that_of_episodes(finished, run):
-    proof, negative = {"expert_optimal": True, "facts": []}, TabularReward(-run.tabular.values)
+    proof, negative = {"terms": {"expert_optimal": True}, "own": {}, "facts": []}, TabularReward(-run.tabular.values)
     found = recomputed(finished, run.config, {"optimality": None, "proof": proof}, run.table, run.expert, negative)
     assert found["facts"][0]["sentence"].startswith("no: the best policy earns at least")
     assert claims_in({"optimality": found, "proof": proof})["expert_optimal"] is False
@@ -81,11 +83,26 @@ def test_facts_of_the_reward_are_computed_and_not_read(copied, run):
     assert facts_in(found.certificate)[0] == facts_in(run.certificate)[0] and "a lie" not in str(found.certificate)
 
 
+def test_no_row_is_left_out_on_the_word_of_a_recorded_proof(copied, run):
+    """A reward that ties every action in a state: who lists its rows as unbreakable hides no tie, and no margin is better."""
+    mdp, tied = run.table.mdp, TabularReward(np.zeros_like(run.tabular.values))
+    every = [[s, a] for s in range(mdp.n_states) for a in range(mdp.n_actions)]
+    forged = {"terms": {"unbreakable_rows": every}, "own": {"unbreakable_rows": every}, "facts": []}
+    plain = {"terms": {}, "own": {}, "facts": []}
+    of_ties = [recomputed(copied, run.config, {"optimality": None, "proof": one}, run.table, run.expert, tied)
+               for one in (forged, plain)]  # fmt: skip
+    assert of_ties[0] == of_ties[1] and of_ties[0]["marginless"] and of_ties[0]["degenerate"]
+    edited(copied / "certificate.json", **{"proof.terms.unbreakable_rows": every, "proof.own": {"unbreakable_rows": every}})
+    found = read_run(with_digests_anew(copied))
+    assert found.certificate["optimality"] == run.certificate["optimality"]
+    assert supplied(diagnose_run, found).to_json() == supplied(diagnose_run, run).to_json()
+
+
 @pytest.mark.parametrize(
     ("entry", "value", "why"),
     [
         ("proof.facts", "all is well", "facts are 'all is well': expected a list"),
-        ("proof.unbreakable_rows", [[99, 0]], r"unbreakable is \[\[99, 0\]\]: expected \(u, 2\)"),
+        ("proof.terms.unbreakable_rows", [[99]], "proof.terms.unbreakable_rows.0 is "),
         ("optimality", 7, "optimality is 7: expected an object"),
     ],
 )
@@ -143,7 +160,9 @@ EDITS = {
         "policies.random.value": (0.0, r"table\.npz"), "policies.expert.value": (2.0, r"expert\.npz"),
         "policies.retrained.value": (0.9, r"agent_policy\.npz"),
     },
-    "certificate.json": {"proof.duality_gap": (0.5, r"certificate\.json"), "optimality.zero": (True, r"certificate\.json")},
+    "certificate.json": {
+        "proof.terms.duality_gap": (0.5, r"certificate\.json"), "optimality.zero": (True, r"certificate\.json"),
+    },
     "config.json": {"learner.type": ("FeatureLP", r"config\.json"), "epsilon": (0.1, r"config\.json")},
 }  # fmt: skip
 
@@ -160,7 +179,7 @@ def test_an_entry_that_other_files_contradict_is_named_with_them(copied, name, e
     ("name", "entry", "value", "gone"),
     [
         ("metrics.json", "reward.status", "inaccurate", ["metrics.json"]),
-        ("certificate.json", "proof.objective", 7.0, ["certificate.json", "metrics.json"]),
+        ("certificate.json", "proof.terms.objective", 7.0, ["certificate.json", "metrics.json"]),
         ("environment.json", "id", "Theirs-v0", ["environment.json"]),
     ],
 )

@@ -1,7 +1,7 @@
 """What every learner's proof says of its program's optimum."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 from irl_gym.facts import Fact, aligned, plain
 
@@ -12,6 +12,8 @@ ROUNDING = 1e-7
 class Proven:
     """What every proof says of the program's optimum."""
 
+    known: ClassVar[bool] = True
+    """Are the entries of `to_json` those that the library reads by name?"""
     objective: float
     dual_bound: float
 

@@ -94,7 +94,7 @@ def lambda_slider(scene: Scene, lambda_path: Mapping[str, Any], certificate: Map
     sets = greedy_sets(scene, pieces.rewards)
     shown = [_rewards(scene, pieces), _policy(scene, sets), _margins(scene, pieces), _norms(pieces)]
     data = {
-        "start": _own(pieces, certificate["proof"].get("l1")),
+        "start": _own(pieces, certificate["proof"]["terms"].get("l1")),
         "pieces": [_told(pieces, i, scene) for i in range(len(pieces.low))],
         "figures": {panel.name: changing for panel, changing in shown},
     }
@@ -107,7 +107,7 @@ def lambda_slider(scene: Scene, lambda_path: Mapping[str, Any], certificate: Map
             if stopped
             else f" The path is not certified: the optimum can be {more} above it, and pieces may lack."
         )
-    if certificate["proof"].get("slack") is not None:
+    if certificate["proof"]["terms"].get("slack") is not None:
         thinned += " Its rows are hard, where the run's own program prices violations: so its lambda_0 is another."
     lead = (
         "A price lambda on ||R||_1 makes the reward simpler. Between two breakpoints the reward does not change; from "

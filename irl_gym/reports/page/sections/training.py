@@ -171,7 +171,7 @@ def widths(
 def _least_margin(learner: Mapping[str, Any], certificate: Mapping[str, Any]) -> str:
     """The margin that the feasible rewards have: half the largest that all states can have at once, as FiniteLP's own cap."""
     told = "half the largest that all states can have at once"
-    cap = certificate["proof"].get("margin_cap")
+    cap = certificate["proof"]["terms"].get("margin_cap")
     own = learner.get("margin_cap") == "auto" and isinstance(cap, int | float)
     return f"{number(cap)}, {told}," if own else told
 

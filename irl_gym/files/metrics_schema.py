@@ -193,7 +193,7 @@ Training = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Co
 class Metrics(TypedDict):
     """metrics.json, of `scorecard.scorecard`."""
 
-    policies: Annotated[dict[str, Row], AfterValidator(_with_references)]
+    policies: Annotated[dict[Annotated[str, Field(max_length=200)], Row], AfterValidator(_with_references)]
     reward: Annotated[_Rewarded, AfterValidator(_together)]
     training: Training
     table: Sized | None

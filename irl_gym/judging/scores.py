@@ -97,7 +97,8 @@ def others(policies: Iterable[str]) -> list[str]:
 
 
 def agent_of(policies: Iterable[str]) -> str:
-    """The one that is spoken of where there is room for one: the retrained agent, or without it the first that is no reference.
+    """The one that is spoken of where there is room for one: the retrained agent, without it the learner's policy, or else the
+    first that is no reference.
 
     Raises:
         KeyError: there are references only.
@@ -105,7 +106,7 @@ def agent_of(policies: Iterable[str]) -> str:
     found = others(policies)
     if not found:
         raise KeyError(RETRAINED)
-    return RETRAINED if RETRAINED in found else found[0]
+    return next((name for name in (RETRAINED, LEARNED) if name in found), found[0])
 
 
 def called(name: str) -> str:

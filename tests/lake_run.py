@@ -15,7 +15,11 @@ def asked(**changes):
 
 def of_policies(name, seed=0):
     """A learner of a policy, of a policy and a reward, or of a policy without a table."""
-    few = {"env_kwargs": {"max_episode_steps": 50}, "expert": SB3(total_timesteps=256), "num_envs": 2}
+    few = {
+        "env_kwargs": {"max_episode_steps": 50},
+        "expert": SB3(total_timesteps=256, hyperparameters={"n_steps": 64, "batch_size": 64}),
+        "num_envs": 2,
+    }
     return {
         "policy": lambda: asked(learner=Copycat(), seed=seed),
         "both": lambda: asked(learner=Both(), retrain=ValueIteration(), seed=seed),

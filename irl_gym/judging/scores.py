@@ -109,9 +109,22 @@ def agent_of(policies: Iterable[str]) -> str:
     return next((name for name in (RETRAINED, LEARNED) if name in found), found[0])
 
 
+CALLED = {RETRAINED: "retrained agent", LEARNED: "learner's policy"}
+
+
 def called(name: str) -> str:
     """What a judged policy is called in a table."""
-    return {RETRAINED: "retrained agent", LEARNED: "learner's policy"}.get(name, name)
+    return CALLED.get(name, name)
+
+
+def the(name: str) -> str:
+    """What it is called in a sentence."""
+    return f"the {CALLED[name]}" if name in CALLED else f"the policy {name}"
+
+
+def several(name: str) -> str:
+    """What such policies of several runs are called."""
+    return {RETRAINED: "retrained agents", LEARNED: "learner's policies"}.get(name, name)
 
 
 def score_of(score: float | None) -> str:

@@ -159,7 +159,7 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
         scene = scenes[letter]
         if run.learned is None:
             continue
-        if scene is None:
+        if scene is None or scene.learned is None:
             section = compared.weights(run.learned)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
@@ -171,17 +171,18 @@ def _rewards(named: Mapping[str, Run], scenes: Mapping[str, Scene | None]) -> Se
 
 
 def _policies(scenes: Mapping[str, Scene | None]) -> Section | None:
-    """The retrained agents, with what deviates shaded."""
+    """What is judged in each run, with what deviates shaded."""
     made: list[Panel] = []
     for letter, scene in scenes.items():
         if scene is None:
             continue
         for panel in compared.policy_panels(scene):
             if panel.name != "policy-expert":
-                made.append(replace(panel, name=f"policy-{letter}", title=f"Run {letter}"))
+                title = f"Run {letter}: {panel.title[0].lower()}{panel.title[1:]}"
+                made.append(replace(panel, name=f"{panel.name}-{letter}", title=title))
     if not made:
         return None
-    return Section("policies", "Retrained agents", "What each agent does; shaded is where it deviates from its expert.", made)
+    return Section("policies", "Policies", "What was judged in each run; shaded is where it deviates from its expert.", made)
 
 
 def _differences(named: Mapping[str, Run]) -> Section:
@@ -251,5 +252,6 @@ def _doctors(named: Mapping[str, Run]) -> Section:
             told = finding(one, run.worded, given=run.config.get("dataset") is not None)
             findings.append({**told, "name": f"run {letter}: {told['name']}"})
     lead = "What is to be said against each reward, and what to do about it. " if findings else ""
+    lead += "As recorded when each run was made. " if any(run.diagnosis for run in named.values()) else ""
     lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())
     return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, score_of
+from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, agent_of, called, score_of, several
 from irl_gym.reports.comparison.pooled import averaged, returned, spoken
 from irl_gym.reports.comparison.shared_worlds import agree, levels_of, levels_told, one_scale, one_world, worth
 from irl_gym.reports.page.panels import Panel
@@ -24,7 +24,8 @@ TITLE = "Learning curves"
 
 def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
-    who = "retrained agent" if {agent_of(run.metrics["policies"]) for run in named.values()} == {RETRAINED} else "agent"
+    agents = {agent_of(run.metrics["policies"]) for run in named.values()}
+    who, all_of = (called(*agents), several(*agents)) if len(agents) == 1 and agents <= {*CALLED} else ("agent", "agents")
     scores = {letter: _agent(run)["score"] for letter, run in named.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
@@ -32,18 +33,18 @@ def sentence(named: Mapping[str, Run], found: Sequence[Pool]) -> str:
     if len(found) == 1 and len(found[0].runs) == len(named) and found[0].score is not None:
         expert, (pool,) = "the expert" if one_scale(named) else "the own expert of each", found
         means = f"a score of {spoken(pool.score)} and a {returned(pool)}, each the {averaged(pool)} with its 95 % interval"
-        return f"Over {len(named)} seeds the {who}s have {means}. By score random actions are 0, {expert} is 1."
+        return f"Over {len(named)} seeds the {all_of} have {means}. By score random actions are 0, {expert} is 1."
     if not one_scale(named):
         each = "; ".join(f"run {letter} {_earned(run)} ({_ends({letter: run})})" for letter, run in named.items())
         return (
-            f"Scores of the {who}s: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
+            f"Scores of the {all_of}: {each}. By score random actions are 0, the expert is 1. {_unlike(named)}, so a "
             "score says how near each agent comes to its own expert, not which run is better."
         )
     best, worst = max(known, key=lambda one: known[one]), min(known, key=lambda one: known[one])
     scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(named)}."
     if score_of(known[best]) == score_of(known[worst]):
         paid = _spread([_agent(run)["mean_return"] for run in named.values()])
-        return f"The {who}s have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
+        return f"The {all_of} have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
         f"The {who} of run {best} has the best score, {_earned(named[best])}; that of run {worst} the worst, "
         f"{_earned(named[worst])}.{_otherwise(named, best)} {scale}"

@@ -52,7 +52,7 @@ def sections_of(run: Run) -> Iterator[Section]:
     contents = Contents(run)
     for show in SECTIONS:
         need = missing(show, contents, run)
-        section = supplied(show, contents, run) if need is None else absent(need, run.stages)
+        section = supplied(show, contents, run) if need is None else absent(need, run.stages, rewarded=run.learned is not None)
         if section is not None:
             yield section
 
@@ -95,7 +95,6 @@ def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | 
 SECTIONS: tuple[Callable[..., Section], ...] = (
     policies_table,
     compared.rewards,
-    compared.weights,
     compared.values,
     compared.policies,
     slider.lambda_slider,

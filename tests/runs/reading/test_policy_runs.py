@@ -7,10 +7,9 @@ import pytest
 from forgetting import with_digests_anew
 from lake_run import of_policies
 
-from irl_gym.errors import InvalidParameter, RunIncomplete
+from irl_gym.errors import RunIncomplete
 from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.loop.pipeline import recover_and_retrain
-from irl_gym.loop.worlds import SteppedWorld
 from irl_gym.mdp.policies import load_actions
 from irl_gym.runs.run import read_run
 
@@ -101,15 +100,3 @@ def test_a_policy_that_no_file_keeps_is_learned_again_where_a_run_is_continued(p
     (path / "metrics.json").unlink()
     recover_and_retrain(of_policies("stepped"), path)
     assert (path / "metrics.json").read_bytes() == before
-
-
-def test_a_function_is_no_policy_and_the_mend_makes_it_one(policy_run):
-    import gymnasium as gym
-
-    from irl_gym.agents.experts import Acting
-
-    env = gym.make("CartPole-v1")
-    world = SteppedWorld(env, 0.99, 2, 20, 0)
-    with pytest.raises(InvalidParameter, match=r"expected, where there is no table, one with `predict`\. Wrap a function"):
-        world.can_keep(lambda seen: 0)
-    assert world.can_keep(Acting.of(lambda seen: 0, env)) is False

@@ -53,13 +53,26 @@ def _fact(i: int, told: Any) -> Fact:
             raise DamagedFile(f"facts[{i}] has the {key} {told[key]!r:.60}: expected text of at most {longest} characters.")
     if told["mood"] not in get_args(Mood):
         raise DamagedFile(f"facts[{i}] has the mood {told['mood']!r:.60}: expected one of {', '.join(get_args(Mood))}.")
-    label, sentence = (harmless(told[key]).replace("\n", "\\n") for key in ("label", "sentence"))
-    return Fact(label, sentence, told["mood"])
+    return Fact(one_line(told["label"]), one_line(told["sentence"]), told["mood"])
 
 
 def harmless(text: str) -> str:
     """A text that may be out of a file, without what a terminal obeys: controls, and marks that turn its direction."""
     return "".join(one if one.isprintable() or one == "\n" else ascii(one)[1:-1] for one in text)
+
+
+def one_line(text: str) -> str:
+    """The same in one line, which nobody takes for two."""
+    return harmless(text).replace("\n", "\\n")
+
+
+def in_lines(told: Any) -> Any:
+    """Content of json, with every name and every text of it harmless and in one line."""
+    if isinstance(told, dict):
+        return {one_line(key): in_lines(value) for key, value in told.items()}
+    if isinstance(told, list | tuple):
+        return [in_lines(one) for one in told]
+    return one_line(told) if isinstance(told, str) else told
 
 
 def aligned(facts: Iterable[Fact]) -> str:

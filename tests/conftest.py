@@ -82,6 +82,24 @@ def finished(tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="session")
+def policy_run(tmp_path_factory):
+    """Gives the folder of a finished run of `lake_run.of_policies`; each is made once."""
+    from lake_run import of_policies
+
+    from irl_gym.loop.pipeline import recover_and_retrain
+
+    made = {}
+
+    def get(name, seed=0):
+        if (name, seed) not in made:
+            made[name, seed] = tmp_path_factory.mktemp("runs") / f"{name}-{seed}"
+            recover_and_retrain(of_policies(name, seed), made[name, seed])
+        return made[name, seed]
+
+    return get
+
+
 @pytest.fixture
 def copied(finished, tmp_path):
     """A copy of a finished run."""

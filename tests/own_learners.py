@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from irl_gym.agents.experts import Acting
 from irl_gym.demonstrations.demonstrated import smoothed
 from irl_gym.facts import Fact
 from irl_gym.learners.base import Outcome
@@ -53,6 +54,32 @@ class Copycat:
         known = self.needs.of(problem, self)
         actions = int(known.spaces.actions.n)
         return Outcome(None, Status.LEARNED, Told(0), policy=np.nan_to_num(smoothed(known.seen), nan=1 / actions))
+
+
+@dataclass(frozen=True)
+class Both(Copycat):
+    """The same policy, and a reward of what was seen."""
+
+    def learn(self, problem, rng):
+        policy = super().learn(problem, rng).policy
+        seen = problem.spaces.states
+        visits = np.zeros(seen.n_states)
+        for episode in problem.demonstrations:
+            np.add.at(visits, episode.rows(seen)[1:], 1.0)
+        return Outcome(TabularReward(visits / visits.max()), Status.LEARNED, Told(0), policy=policy)
+
+
+@dataclass(frozen=True)
+class Pusher:
+    """Pushes a cart to where its pole falls: a function of observations, which no file keeps."""
+
+    weight: float = 1.0
+    needs: ClassVar[Needs] = Needs(("demonstrations",))
+
+    def learn(self, problem, rng):
+        known = self.needs.of(problem, self)
+        push = Acting(lambda seen: int(seen[2] + self.weight * seen[3] > 0), 2, known.spaces.observations)
+        return Outcome(None, Status.LEARNED, Told(0), policy=push)
 
 
 @dataclass(frozen=True)

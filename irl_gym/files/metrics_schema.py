@@ -203,7 +203,7 @@ TrainingEntry = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9
 class Metrics(TypedDict):
     """metrics.json, of `scorecard.scorecard`."""
 
-    policies: Annotated[dict[str, Row], AfterValidator(_with_references)]
+    policies: Annotated[dict[Annotated[str, Field(max_length=200)], Row], AfterValidator(_with_references)]
     reward: Annotated[_Rewarded, AfterValidator(_together)]
     training: TrainingEntry
     table: Sized | None

@@ -185,6 +185,7 @@ class Learned(Stage):
     learner: Text
     status: StatusName
     stats: Stats
+    policy: NotRequired[bool]
 
 
 class Planned(Stage):

@@ -97,7 +97,8 @@ def others(policies: Iterable[str]) -> list[str]:
 
 
 def agent_of(policies: Iterable[str]) -> str:
-    """The one that is spoken of where there is room for one: the retrained agent, or without it the first that is no reference.
+    """The one that is spoken of where there is room for one: the retrained agent, without it the learner's policy, or else the
+    first that is no reference.
 
     Raises:
         KeyError: there are references only.
@@ -105,12 +106,25 @@ def agent_of(policies: Iterable[str]) -> str:
     found = others(policies)
     if not found:
         raise KeyError(RETRAINED)
-    return RETRAINED if RETRAINED in found else found[0]
+    return next((name for name in (RETRAINED, LEARNED) if name in found), found[0])
+
+
+CALLED = {RETRAINED: "retrained agent", LEARNED: "learner's policy"}
 
 
 def called(name: str) -> str:
     """What a judged policy is called in a table."""
-    return {RETRAINED: "retrained agent", LEARNED: "learner's policy"}.get(name, name)
+    return CALLED.get(name, name)
+
+
+def the(name: str) -> str:
+    """What it is called in a sentence."""
+    return f"the {CALLED[name]}" if name in CALLED else f"the policy {name}"
+
+
+def several(name: str) -> str:
+    """What such policies of several runs are called."""
+    return {RETRAINED: "retrained agents", LEARNED: "learner's policies"}.get(name, name)
 
 
 def score_of(score: float | None) -> str:

@@ -58,7 +58,8 @@ class Outcome(Generic[AnyReward, AnyProof]):
     """Solver, seconds, iterations, program by program."""
     policy: Any = None
     """Of a table (S,) actions, (S, A) probabilities, or what has `predict`, whose deterministic actions a run keeps; without a
-    table an agent of SB3 (`irl_gym.agents.planners.Agent`). None of a learner of rewards alone."""
+    table what has `predict`, of observations and of batches. There a run keeps agents of SB3 (`irl_gym.agents.planners.Agent`);
+    any other policy is learned again where a run is continued. None of a learner of rewards alone."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.reward, TabularReward | LinearReward | None):

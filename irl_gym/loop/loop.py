@@ -22,16 +22,18 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
+from irl_gym.errors import InvalidParameter
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
-from irl_gym.files.metrics_schema import Metrics
-from irl_gym.files.run_folder import RunFolder, read_json
+from irl_gym.files.run_folder import RunFolder
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
 from irl_gym.judging.scores import LEARNED
+from irl_gym.learners.base import Outcome
 from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.loop import figures, final_stages, stages
 from irl_gym.loop.stages import REWARD, OnProgress
@@ -43,7 +45,7 @@ from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.experiment import Experiment, as_config
 from irl_gym.runs.identity import STAGES, claim, record_start, write_environment, write_version
 from irl_gym.runs.named_parts import environment_of
-from irl_gym.runs.scorecard import TOLD_STAGES
+from irl_gym.runs.scorecard import TOLD_STAGES, read_metrics
 from irl_gym.runs.supply import missing, supplied
 from irl_gym.tables.table_files import TABLE
 
@@ -227,6 +229,15 @@ class Loop:
         return self.expert if self.seen is None else most_frequent(self.seen)
 
     @cached_property
+    def outcome(self) -> Outcome:
+        """What the learner gives, worked out now."""
+        learner = self.experiment.learner
+        found: Any = learner.learn(self.problem, np.random.default_rng(self.experiment.seed))
+        if not isinstance(found, Outcome):
+            raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(found).__name__}: expected an Outcome.")
+        return found
+
+    @cached_property
     def solved(self) -> Mapping[str, Any]:
         """What was recorded as the reward was learned."""
         return self.stage("reward")
@@ -238,9 +249,13 @@ class Loop:
 
     @cached_property
     def learned_policy(self) -> Any:
-        """The learner's own policy, as `agent`; None of a learner of rewards alone."""
-        kept = any(name.startswith(LEARNED) for name in self.stage("reward")["files"])
-        return self.world.load(self.folder, LEARNED) if kept else None
+        """The learner's own policy, as `agent`; None of a learner of rewards alone. One that no file keeps is learned again,
+        from the same seed, where a run is continued.
+        """
+        record = self.stage("reward")
+        if any(name.startswith(LEARNED) for name in record["files"]):
+            return self.world.load(self.folder, LEARNED)
+        return self.outcome.policy if record.get("policy", False) else None
 
     @cached_property
     def tabular(self) -> TabularReward | None:
@@ -275,4 +290,4 @@ class Loop:
     @cached_property
     def judged(self) -> Mapping[str, Any]:
         """The content of metrics.json."""
-        return self.folder.load("metrics.json", lambda path: read_json(path, Metrics))
+        return self.folder.load("metrics.json", read_metrics)

@@ -101,22 +101,20 @@ def played_episodes(
 
 
 def learned_outcome(
-    folder: Path, learner: Learner, problem: Problem, world: RunWorld, seed: int, table: Tabulation | None, known_expert: Any,
-    from_episodes: bool,
+    folder: Path, learner: Learner, problem: Problem, outcome: Outcome, world: RunWorld, table: Tabulation | None,
+    known_expert: Any, from_episodes: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The reward or the policy that a learner finds, or both, and what it proves."""
-    outcome: Any = learner.learn(problem, np.random.default_rng(seed))
-    if not isinstance(outcome, Outcome):
-        raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(outcome).__name__}: expected an Outcome.")
     if table is None and outcome.reward is not None and outcome.reward.alpha is None:
         raise InvalidReward("the reward is of rows of a table, and there is none: expected a LinearReward of observations.")
     if outcome.reward is not None:
         outcome.reward.save(folder / REWARD)
-    if outcome.policy is not None:
+    if outcome.policy is not None and world.can_keep(outcome.policy):
         world.keep(outcome.policy, folder, LEARNED)
     known = None if table is None else (table, known_expert)
     certificate = certificate_of(outcome, known, episodes=from_episodes)
     record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
+    record["policy"] = outcome.policy is not None
     _check_kept(learner, certificate, record)
     write_json(folder / "certificate.json", certificate)
     if problem.environment is not None:

@@ -150,6 +150,10 @@ class TableWorld:
         """Write the table, unless it is there."""
         keep_table(self.table, folder)
 
+    def can_keep(self, policy: Any) -> bool:
+        """Is there a file for it? Its actions are kept, whatever it is."""
+        return True
+
     def keep(self, policy: Any, folder: Path, name: str, epsilon: float = 0.0) -> None:
         """Write the actions, or with noise or of a table with several the probabilities; an agent in SB3's zip too.
 

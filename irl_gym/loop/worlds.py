@@ -117,6 +117,19 @@ class SteppedWorld:
     def keep_table(self, folder: Path) -> None:
         """Write nothing."""
 
+    def can_keep(self, policy: Any) -> bool:
+        """Is there a file for it? Of policies that act, agents of SB3 have one.
+
+        Raises:
+            InvalidParameter: it cannot act on observations.
+        """
+        if not isinstance(policy, Policy):
+            raise InvalidParameter(
+                f"the policy is a {type(policy).__name__}: expected, where there is no table, one with `predict`. Wrap a "
+                "function of observations in `irl_gym.agents.experts.Acting`."
+            )
+        return isinstance(policy, Agent)
+
     def keep(self, policy: Policy, folder: Path, name: str, epsilon: float = 0.0) -> None:
         """Write an agent in SB3's zip, its algorithm and its noise as json."""
         if not isinstance(policy, Agent):

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.demonstrations.endings import LOST
-from irl_gym.facts import Fact
+from irl_gym.facts import Fact, harmless
 from irl_gym.files.run_folder import read_json
 from irl_gym.files.run_schema import Diagnosed, EnvironmentFile
 from irl_gym.judging import measures
@@ -53,23 +53,24 @@ def render(report: Report) -> Iterator[RenderableType]:
     yield f"Kept in {out}: {own}{made} and films."
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
-        yield Text(lost)
-    yield from _doctor(out)
+        yield Text(harmless(lost))
+    yield from _doctor(out, kept=bool(report.stages.get("ambiguity", {}).get("kept")))
     yield f"Open {report.page} in a browser."
 
 
-def _doctor(out: Path) -> Iterator[RenderableType]:
-    """The doctor's answer, and what of it is about the expert that was given."""
+def _doctor(out: Path, *, kept: bool) -> Iterator[RenderableType]:
+    """The doctor's answer, and what of it is about the expert that was given; of a run that is kept it is the record."""
     diagnosis = read_json(out / "diagnosis.json", Diagnosed)
     for one in diagnosis["findings"]:
         if one["name"] in ABOUT_THE_GIVEN:
-            yield Text(f"Warning: {one['sentence']} {one['mend']}", "yellow")
+            yield Text(harmless(f"Warning: {one['sentence']} {one['mend']}"), "yellow")
     more = (
         f" This command tells them, with mends: python scripts/doctor.py --run {shlex.quote(str(out))}"
         if diagnosis["findings"]
         else ""
     )
-    yield Text(f"The doctor: {told_answer(diagnosis)}{more}", ANSWERS[diagnosis["answer"]])
+    who = "The doctor, as recorded when the run was made:" if kept else "The doctor:"
+    yield Text(harmless(f"{who} {told_answer(diagnosis)}{more}"), ANSWERS[diagnosis["answer"]])
 
 
 def _asked(config: Mapping[str, Any], hidden: Mapping[str, int], out: Path) -> str:
@@ -96,7 +97,7 @@ def _recorded_in(out: Path) -> str:
     """The id of the environment that a dataset brought with it, where it has one."""
     kept = out / ENVIRONMENT
     found = read_json(kept, EnvironmentFile)["id"] if kept.exists() else None
-    return f"{found}, " if found else ""
+    return f"{harmless(found)}, " if found else ""
 
 
 def _policies(metrics: Mapping[str, Any]) -> Table:

@@ -15,7 +15,6 @@ from gymnasium import spaces
 from irl_gym.errors import InvalidInput, RunIncomplete
 from irl_gym.features.linear_reward import LinearReward, load_reward
 from irl_gym.files.archives import read_arrays
-from irl_gym.files.metrics_schema import Metrics
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
 from irl_gym.files.run_schema import Config, Diagnosed, EnvironmentFile, Grid, Version, checked
@@ -28,10 +27,10 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.films import Film, load_film
 from irl_gym.runs.identity import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
-from irl_gym.runs.reading.belonging import left_open, strangers
+from irl_gym.runs.reading.belonging import at_odds, left_open, strangers
 from irl_gym.runs.reading.run_reader import RunReader
-from irl_gym.runs.reading.verified import Claim, again, claims, recomputed, with_again
-from irl_gym.runs.scorecard import reward_told
+from irl_gym.runs.reading.verified import FILES, Claim, again, claims, recomputed, shares, with_again
+from irl_gym.runs.scorecard import read_metrics, reward_told
 from irl_gym.runs.supply import supplied
 from irl_gym.spaces.listed_states import usual_observation
 from irl_gym.spaces.names import state_name
@@ -63,8 +62,9 @@ class Run:
     """The recovered reward, of rows or of observations; None of a learner of policies alone."""
     expert: np.ndarray | None
     """(S,) actions, or (S, A) probabilities with rows of NaN where nothing is known; None where there is no table."""
-    agent: np.ndarray | None
-    """(S,) actions of the retrained agent, or (S, A); None where there is no table."""
+    agents: Mapping[str, np.ndarray]
+    """(S,) actions, or (S, A), of the retrained agent and the learner's own policy, by their names in metrics.json; none
+    without a table."""
     certificate: Mapping[str, Any]
     """The content of certificate.json; where `recomputed`, its optimality is not the record's but of these files."""
     metrics: Mapping[str, Any]
@@ -92,6 +92,16 @@ class Run:
     """And what they say of values, scores, agreement, the worst tie and distances between rewards?"""
 
     @property
+    def agent(self) -> np.ndarray | None:
+        """(S,) actions of the retrained agent, or (S, A); None where there is none, or no table."""
+        return self.agents.get(RETRAINED)
+
+    @property
+    def rewarded(self) -> bool:
+        """Was a reward learned?"""
+        return self.learned is not None
+
+    @property
     def tabular(self) -> TabularReward | None:
         """The recovered reward on the rows of the table; None where there is none."""
         return None if self.table is None or self.learned is None else self.learned.tabular(self.table.states)
@@ -111,12 +121,13 @@ class Run:
         """Whose word it is, what is said of the run."""
         again = ("whether the expert is optimal under the reward",) if self.recomputed else ()
         if self.judged_again:
-            again += ("values, scores and agreement", "the worst tie", "distances between rewards", "the size of the table")
+            of_reward = () if self.learned is None else ("the worst tie", "distances between rewards")
+            again += ("values, scores and agreement", *of_reward, "the size of the table")
         if not again:
             return "Everything is the run's own record."
         of = ("the value of its expert's episodes",) if self.config.get("dataset") is not None else ()
         of += ("values by episodes",) if any("sampled_value" in row for row in self.metrics["policies"].values()) else ()
-        of += tuple(f"what is said of {name}" for name in others(self.metrics["policies"]) if name != RETRAINED)
+        of += tuple(f"what is said of {name}" for name in others(self.metrics["policies"]) if name not in self.agents)
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
@@ -172,24 +183,18 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     if config.get("env_id") not in (None, env_id):
         what = f"{ENVIRONMENT} is of {env_id!r}: expected {config['env_id']!r}, as config.json has"
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
-    metrics = reader.read(METRICS, lambda one: read_json(one, Metrics))
-    on_table = metrics.get("table") is not None
-    retrained = RETRAINED in metrics["policies"]  # not of a learner of policies: it gives no reward to retrain on
-    if retrained is not ("reward.npz" in stages["reward"]["files"]):
-        what = f"{METRICS} and .stages/reward.json do not agree on whether a reward was learned"
-        raise reader.incomplete(f"{what}; delete {METRICS}, and it is made again")
-    if not on_table and (path / TABLE).exists():
-        raise reader.incomplete(f"{METRICS} tells of no table, and {TABLE} is there; delete {METRICS}, and it is made again")
-    certificate = reader.read("certificate.json", read_certificate)
-    if not retrained and (certificate["optimality"] is not None or (path / "reward.npz").exists()):
-        what = "no agent was retrained, but certificate.json or reward.npz is of a reward"
-        raise reader.incomplete(f"{what}; delete certificate.json and {METRICS}, and they are made again")
+    metrics, certificate = reader.read(METRICS, read_metrics), reader.read("certificate.json", read_certificate)
+    there = {name for name in ("reward.npz", TABLE) if (path / name).exists()}
+    for fault in at_odds(stages["reward"], metrics, certificate, there):
+        raise reader.incomplete(fault)
+    on_table, retrained = metrics.get("table") is not None, RETRAINED in metrics["policies"]
+    judged = [name for name in FILES if on_table and name in metrics["policies"]]
     run = Run(
         path=path, config=config, version=version, env_id=env_id, actions=names,
         table=(table or _table(reader, config, observations)) if on_table else None,
         learned=reader.read("reward.npz", load_reward) if retrained else None,
         expert=reader.read("expert.npz", load_actions) if on_table else None,
-        agent=reader.read("agent_policy.npz", load_actions) if retrained and on_table else None,
+        agents={name: reader.read(FILES[name], load_actions) for name in judged},
         certificate=certificate, metrics=metrics,
         curve=reader.read("learning_curve.csv", read_curve) if retrained else NO_CURVE, stages=stages,
         grid=reader.maybe("grid.json", lambda one: GridLayout.from_json(read_json(one, Grid))),
@@ -230,8 +235,8 @@ def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Sp
 
 
 def _check_together(
-    table: Tabulation | None, learned: TabularReward | LinearReward | None, expert: np.ndarray | None, agent: np.ndarray | None,
-    actions: tuple[str, ...], grid: GridLayout | None, diagnosis: Mapping[str, Any] | None,
+    table: Tabulation | None, learned: TabularReward | LinearReward | None, expert: np.ndarray | None,
+    agents: Mapping[str, np.ndarray], actions: tuple[str, ...], grid: GridLayout | None, diagnosis: Mapping[str, Any] | None,
     widths: Mapping[str, np.ndarray] | None, lambda_path: Mapping[str, Any] | None, reader: RunReader,
 ) -> None:  # fmt: skip
     """Check that what lies beside a table is of that table.
@@ -242,7 +247,8 @@ def _check_together(
     if table is None:
         return
     rewards = {} if learned is None or learned.alpha is not None else {"reward.npz": learned.values}  # weights are of features
-    policies = {name: one for name, one in (("expert.npz", expert), ("agent_policy.npz", agent)) if one is not None}
+    policies = {} if expert is None else {"expert.npz": expert}
+    policies |= {FILES[name]: one for name, one in agents.items()}
     shape = table.mdp.n_states, table.mdp.n_actions
     found = strangers(shape, actions, rewards, policies, grid, diagnosis)
     for fault in itertools.chain(found, left_open(shape, widths, lambda_path)):
@@ -251,8 +257,8 @@ def _check_together(
 
 def _computed(
     path: Path, config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]], certificate: Mapping[str, Any],
-    metrics: Mapping[str, Any], table: Tabulation | None, expert: np.ndarray | None, agent: np.ndarray | None,
-    tabular: TabularReward | None, curve: Curve, reader: RunReader,
+    metrics: Mapping[str, Any], table: Tabulation | None, expert: np.ndarray | None,
+    agents: Mapping[str, np.ndarray], tabular: TabularReward | None, curve: Curve, reader: RunReader,
 ) -> dict[str, Any]:  # fmt: skip
     """What metrics.json says of a run's reward and policies as its files give it now, where they do: the fields that change.
 
@@ -260,14 +266,18 @@ def _computed(
         RunIncomplete: they contradict what was recorded.
     """
     _check_claims(claims(config, stages, certificate, metrics, table), metrics, reader)
-    if table is None or tabular is None:
-        return {}
+    recorded, metrics = metrics, with_again(metrics, {"policies": shares(metrics["policies"])})
+    if table is None:
+        return {"metrics": metrics}
     try:
-        found = recomputed(path, config, certificate, table, expert, tabular)
-        now = again(config, metrics, table, expert, agent, tabular, curve)
+        now = again(config, recorded, table, expert, agents, tabular, curve)
+        found = None if tabular is None else recomputed(path, config, certificate, table, expert, tabular)
     except InvalidInput as error:
-        mend = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
-        raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {mend}") from error
+        what, files = "table and expert", "table.npz and expert.npz"
+        if tabular is not None:
+            what, files = "table, expert and reward", "table.npz, expert.npz and reward.npz"
+        mend = f"delete {files}, and what they hold is made again"
+        raise reader.incomplete(f"its {what} do not bear out its record: {error}; {mend}") from error
     if now is not None:
         _check_claims(now[0], metrics, reader)
         metrics = with_again(metrics, now[1])

@@ -5,11 +5,15 @@ it, so that the same seed gives the same bytes; seconds are in the stages' recor
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from irl_gym.demonstrations.endings import LOST
+from irl_gym.facts import in_lines
+from irl_gym.files.metrics_schema import Metrics
+from irl_gym.files.run_folder import read_json
 from irl_gym.judging import measures
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.estimated import evidence_told
@@ -61,6 +65,16 @@ def scorecard(
         "table": None if table is None else table_told(table, horizon),
         "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"]),
     }  # fmt: skip
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """The content of metrics.json; what a terminal would obey in its names and texts is spelled out.
+
+    Raises:
+        OSError: it cannot be read now.
+        DamagedFile: it is something else.
+    """
+    return in_lines(read_json(path, Metrics))
 
 
 def scale_told(scale: Scale) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from irl_gym.agents.noise import Noisy, boltzmann, noisy
 from irl_gym.agents.planners import Agent
 from irl_gym.agents.shown_observations import BY_HAND, Normaliser, read_statistics
 from irl_gym.demonstrations.datasets import read_minari, write_minari
+from irl_gym.loop.worlds import SteppedWorld
 from irl_gym.mdp.episodes import collect
 from irl_gym.mdp.policies import Policy
 from irl_gym.spaces.states import StateIndex
@@ -32,6 +33,9 @@ class FromOne(Corridor):
     """Counts its actions from 1."""
 
     action_space = spaces.Discrete(2, start=1)
+
+
+STEPPED = SteppedWorld(LAKE, 0.99, 2, 20, 0)
 
 
 def right(observation):
@@ -144,6 +148,9 @@ CASES = [
     ("Give n_actions.", lambda _: noisy(np.ones(3, int), 0.1), lambda _: noisy(np.ones(3, int), 0.1, 2)),
     ("Use `noisy` for tables,", lambda _: Noisy(np.eye(3), 0.1, 3), lambda _: noisy(np.eye(3), 0.1)),
     ("and wrap a function in `Acting`.", lambda _: Noisy(right, 0.1, 4), lambda _: Noisy(Acting.of(right, LAKE), 0.1, 4)),
+    # policies of learners
+    ("Wrap a function of observations in `irl_gym.agents.experts.Acting`.",
+     lambda _: STEPPED.can_keep(right), lambda _: STEPPED.can_keep(Acting.of(right, LAKE)) is False),
     # shown
     ("Write it again.", damaged, lambda root: load_expert(shown(root))),
     ("Write them with np.savez('statistics.npz', ",

@@ -156,7 +156,7 @@ def test_a_judgement_is_a_function_of_table_policies_and_episodes(four):
 FOURTH = {
     "metrics.json": ('"cloned": {', '"how": "cloned from 3 episodes"'), "metrics.csv": ("cloned,value,0.0", "cloned,score,"),
     "terminal": ("│ cloned", "cloned: cloned from 3 episodes.", "\x1b[31m-0.013\x1b", "cloned: not good (-0.013 of value"),
-    "page": ("cloned, cloned from 3 episodes</th>", "Beside it, cloned (cloned from 3 episodes) has a score of -0.013",
+    "page": ("cloned, cloned from 3 episodes</th>", "Beside it, the policy cloned (cloned from 3 episodes) has a score of -",
              "cloned: not good (-0.013 of value"),
     "comparison": ("score, cloned", "value, cloned", "how it came about, cloned", "cloned, judged by the worse share"),
 }  # fmt: skip

@@ -148,7 +148,7 @@ def rewards(
         scene = scenes[letter]
         if reward is None:
             continue
-        if scene is None:
+        if scene is None or scene.learned is None:
             section = compared.weights(reward)
             made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
         else:
@@ -159,18 +159,19 @@ def rewards(
     return Section("rewards", "Learned rewards", lead, made)
 
 
-def retrained(scenes: Mapping[str, Scene | None]) -> Section | None:
-    """The retrained agents, with what deviates shaded."""
+def policies(scenes: Mapping[str, Scene | None]) -> Section | None:
+    """What is judged in each run, with what deviates shaded."""
     made: list[Panel] = []
     for letter, scene in scenes.items():
         if scene is None:
             continue
         for panel in compared.policy_panels(scene):
             if panel.name != "policy-expert":
-                made.append(replace(panel, name=f"policy-{letter}", title=f"Run {letter}"))
+                title = f"Run {letter}: {panel.title[0].lower()}{panel.title[1:]}"
+                made.append(replace(panel, name=f"{panel.name}-{letter}", title=title))
     if not made:
         return None
-    return Section("policies", "Retrained agents", "What each agent does; shaded is where it deviates from its expert.", made)
+    return Section("policies", "Policies", "What was judged in each run; shaded is where it deviates from its expert.", made)
 
 
 def differences(configs: Mapping[str, Mapping[str, Any]]) -> Section:
@@ -243,11 +244,12 @@ def doctors(
             told = finding(one, place_names[letter], given=configs[letter].get("dataset") is not None)
             findings.append({**told, "name": f"run {letter}: {told['name']}"})
     lead = "What is to be said against each reward, and what to do about it. " if findings else ""
+    lead += "As recorded when each run was made. " if any(diagnoses.values()) else ""
     lead += " ".join(f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}: {said}" for said, letters in answers.items())
     return Section("doctor", "Doctor", lead, (), "doctor", {"findings": findings})
 
 
 SECTIONS: tuple[Callable[..., Section | None], ...] = (
-    results, over_seeds, learning, rewards, retrained, differences, proofs, doctors,
+    results, over_seeds, learning, rewards, policies, differences, proofs, doctors,
 )  # fmt: skip
 """In order: each is shown where there is something to show."""

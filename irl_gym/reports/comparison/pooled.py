@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from irl_gym.intervals import Interval
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, others, score_of
+from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, others, score_of, several
+from irl_gym.judging.scores import called as called_policy
 from irl_gym.reports.comparison.shared_worlds import levels_of, levels_told
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.sections.section import Section
@@ -52,7 +53,7 @@ def told(pool: Pool) -> str:
         return f"{called(pool)}: no score, since not every one of the {n} seeds has one; {returned(pool)}"
     means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
     beside = [
-        f"; {name}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
+        f"; {called_policy(name)}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
         for name in others(pool.policies)
         if name != pool.agent
     ]
@@ -78,7 +79,7 @@ def spoken(score: Interval | None) -> str:
 def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
     """What the table says of a pool."""
     config, letter = pool.first.config, next(iter(pool.runs))
-    lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values()]
+    lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values() if run.learned is not None]
     told = {
         "environment": places[letter],
         "learner": str((config.get("learner") or {}).get("type", "")),
@@ -87,15 +88,15 @@ def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
     for name in others(pool.policies):
         told |= _of_policy(pool, name)
     ends = " and ".join(number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
-    return told | {
-        "mean return of random actions and of the expert": ends,
-        "lost by the worst tie, at most": percent(None if None in lost else max(max(lost), 0.0)),
-    }
+    told["mean return of random actions and of the expert"] = ends
+    if lost:  # not of learners of policies
+        told["lost by the worst tie, at most"] = percent(None if None in lost else max(max(lost), 0.0))
+    return told
 
 
 def _of_policy(pool: Pool, name: str) -> dict[str, str]:
     """What the table says of the policies of one name."""
-    whose, scores = "the retrained agents" if name == RETRAINED else name, pool.scores_of(name)
+    whose, scores = f"the {several(name)}" if name in CALLED else name, pool.scores_of(name)
     ends = "none" if scores is None else " and ".join(map(score_of, (scores.min(), scores.max())))
     return {
         f"score of {whose} (95 %)": spoken(pool.score_of(name)),

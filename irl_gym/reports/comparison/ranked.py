@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.judging.curves import Curve
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, score_of
+from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, agent_of, called, score_of, several
 from irl_gym.reports.comparison.pooled import averaged, returned, spoken
 from irl_gym.reports.comparison.shared_worlds import PolicyRows, agree, levels_of, levels_told, worth
 from irl_gym.reports.page.panels import Panel
@@ -25,7 +25,8 @@ TITLE = "Learning curves"
 
 def sentence(policies: Mapping[str, PolicyRows], pools: Sequence[Pool], same_world: bool, same_scale: bool) -> str:
     """Which agent is best, by score and beside it by mean return; of runs that only differ in their seed, how good all are."""
-    who = "retrained agent" if {agent_of(rows) for rows in policies.values()} == {RETRAINED} else "agent"
+    agents = {agent_of(rows) for rows in policies.values()}
+    who, all_of = (called(*agents), several(*agents)) if len(agents) == 1 and agents <= {*CALLED} else ("agent", "agents")
     scores = {letter: _agent(rows)["score"] for letter, rows in policies.items()}
     known = {letter: score for letter, score in scores.items() if score is not None}
     if not known:
@@ -33,11 +34,11 @@ def sentence(policies: Mapping[str, PolicyRows], pools: Sequence[Pool], same_wor
     if len(pools) == 1 and len(pools[0].runs) == len(policies) and pools[0].score is not None:
         expert, (pool,) = "the expert" if same_scale else "the own expert of each", pools
         means = f"a score of {spoken(pool.score)} and a {returned(pool)}, each the {averaged(pool)} with its 95 % interval"
-        return f"Over {len(policies)} seeds the {who}s have {means}. By score random actions are 0, {expert} is 1."
+        return f"Over {len(policies)} seeds the {all_of} have {means}. By score random actions are 0, {expert} is 1."
     if not same_scale:
         each = "; ".join(f"run {letter} {_earned(rows)} ({_ends({letter: rows})})" for letter, rows in policies.items())
         return (
-            f"Scores of the {who}s: {each}. By score random actions are 0, the expert is 1. "
+            f"Scores of the {all_of}: {each}. By score random actions are 0, the expert is 1. "
             f"{_unlike(policies, same_world)}, so a score says how near each agent comes to its own expert, not "
             "which run is better."
         )
@@ -45,7 +46,7 @@ def sentence(policies: Mapping[str, PolicyRows], pools: Sequence[Pool], same_wor
     scale = f"By score random actions are 0, the expert is 1; by mean return {_ends(policies)}."
     if score_of(known[best]) == score_of(known[worst]):
         paid = _spread([_agent(rows)["mean_return"] for rows in policies.values()])
-        return f"The {who}s have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
+        return f"The {all_of} have one score, {score_of(known[best])}, and mean return {paid}. {scale}"
     return (
         f"The {who} of run {best} has the best score, {_earned(policies[best])}; that of run {worst} the worst, "
         f"{_earned(policies[worst])}.{_otherwise(policies, best)} {scale}"

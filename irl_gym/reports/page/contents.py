@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.curves import Curve
-from irl_gym.mdp.rewards import TabularReward
 from irl_gym.reports.page.maps import Map
 from irl_gym.reports.page.scene import Scene
 from irl_gym.runs.films import Film
@@ -24,12 +22,12 @@ class RunContents:
     @cached_property
     def scene(self) -> Scene | None:
         """What is known state by state; None where there is no table."""
-        run, learned = self.run, self.run.tabular
-        if run.table is None or learned is None:
+        run = self.run
+        if run.table is None:
             return None
         told = run.metrics.get("demonstrations", {})
         by_episodes = bool(told.get("episodes_only", False))
-        return Scene(run.table, learned, run.expert, run.agent, run.actions, run.state_name, run.grid, by_episodes)
+        return Scene(run.table, run.tabular, run.expert, run.agents, run.actions, run.state_name, run.grid, by_episodes)
 
     @property
     def place_name(self) -> Callable[[int, int | None], str]:
@@ -40,11 +38,6 @@ class RunContents:
     def given(self) -> bool:
         """Was a dataset given, in place of an expert?"""
         return self.run.config.get("dataset") is not None
-
-    @property
-    def weights(self) -> TabularReward | LinearReward | None:
-        """The recovered reward where it is not known state by state."""
-        return self.run.learned if self.scene is None else None
 
     @property
     def place(self) -> Map | None:

@@ -98,7 +98,6 @@ def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | 
 SECTIONS: tuple[Callable[..., Section], ...] = (
     policies_table,
     compared.rewards,
-    compared.weights,
     compared.values,
     compared.policies,
     slider.lambda_slider,

@@ -3,7 +3,7 @@
 Axes: S states, A actions.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,16 +28,16 @@ LEAST_SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is known state by state, and what is recovered there."""
+    """What is known state by state, and what is learned there."""
 
     table: Tabulation
     """P, d0, gamma, the true reward and the states."""
-    learned: TabularReward
-    """The recovered reward on the rows of the table."""
+    learned: TabularReward | None
+    """The recovered reward on the rows of the table; None of a learner of policies."""
     known_expert: np.ndarray | None
     """(S,) actions, or (S, A) probabilities with rows of NaN where nothing is known; None where nothing is known at all."""
-    known_agent: np.ndarray | None
-    """(S,) actions of the retrained agent, or (S, A)."""
+    known_agents: Mapping[str, np.ndarray]
+    """(S,) actions, or (S, A), of the policies that are judged by the expert, by their names in metrics.json."""
     actions: tuple[str, ...]
     """(A,) names of the actions."""
     called: Callable[[int], str]
@@ -79,9 +79,9 @@ class Scene:
         return self._distribution(np.where(self.seen[:, None], policy, 1 / self.mdp.n_actions))
 
     @cached_property
-    def agent(self) -> Matrix:
-        """(S, A) the retrained agent's probabilities."""
-        return self._distribution(self.known_agent)
+    def agents(self) -> Mapping[str, Matrix]:
+        """(S, A) the probabilities of each policy that is judged, by its name."""
+        return {name: self._distribution(policy) for name, policy in self.known_agents.items()}
 
     def _distribution(self, policy: np.ndarray | None) -> np.ndarray:
         n_states, n_actions = self.mdp.n_states, self.mdp.n_actions
@@ -102,21 +102,18 @@ class Scene:
         """(S, A) the actions that the agreement of metrics.json counts: the optimal ones, or a poor expert's own."""
         return good_actions(self.mdp, None if self.by_episodes else self.known_expert, self.best)
 
-    @cached_property
-    def deviates(self) -> StateMask:
-        """(S,) states in which the agent's likeliest action is none of the good ones."""
-        return self.acting & ~self.good[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)]
+    def deviates(self, policy: Matrix) -> StateMask:
+        """(S,) states in which the likeliest action of a policy is none of the good ones."""
+        return self.acting & ~self.good[np.arange(self.mdp.n_states), policy.argmax(axis=1)]
 
-    @cached_property
-    def lost(self) -> Vector:
-        """(S,) what the agent's likeliest action loses there, if all later ones are optimal, under the true reward."""
+    def lost(self, policy: Matrix) -> Vector:
+        """(S,) what the likeliest action of a policy loses there, if all later ones are optimal, under the true reward."""
         gains = self.best.advantages.values.astype(np.float64)
-        return np.where(self.acting, -gains[np.arange(self.mdp.n_states), self.agent.argmax(axis=1)], 0.0)
+        return np.where(self.acting, -gains[np.arange(self.mdp.n_states), policy.argmax(axis=1)], 0.0)
 
-    @cached_property
-    def behind(self) -> Vector:
-        """(S,) what the agent loses from there on against acting best, under the true reward."""
-        return np.where(self.acting, self.best.behind(self.agent)[0], 0.0)
+    def behind(self, policy: Matrix) -> Vector:
+        """(S,) what a policy loses from there on against acting best, under the true reward."""
+        return np.where(self.acting, self.best.behind(policy)[0], 0.0)
 
     def value(self, reward: TabularReward, policy: Matrix) -> Vector:
         """(S,) a policy's value; NaN in states that are not judged."""

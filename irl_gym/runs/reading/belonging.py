@@ -3,11 +3,12 @@
 Axes: S states, A actions, k pieces of the lambda path.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from irl_gym.judging.scores import LEARNED, RETRAINED
 from irl_gym.tables.layouts import GridLayout
 
 MADE_AGAIN = "delete it, and its stage is run again"
@@ -36,6 +37,9 @@ def strangers(
     for name, policy in policies.items():
         if policy.ndim == 1 and policy.max(initial=0) >= shape[1]:
             yield f"{name} has action {policy.max()} of {shape[1]}; {MADE_AGAIN}"
+        if name != "expert.npz" and policy.ndim == 2 and (unknown := np.isnan(policy).any(axis=1)).any():
+            state = int(np.argmax(unknown))
+            yield f"{name} says nothing of state {state}, and a policy that is judged acts in all; {MADE_AGAIN}"
     if grid is not None and (grid.n_cells > shape[0] or len(grid.directions) != shape[1]):
         cells = f"{grid.n_cells} cells and {len(grid.directions)} actions"
         yield f"grid.json has {cells} for a table of {shape[0]} states and {shape[1]} actions; {MADE_AGAIN}"
@@ -43,6 +47,28 @@ def strangers(
         for name, n in (("states", shape[0]), ("actions", shape[1])):
             if (most := max(found[name], default=0)) >= n:
                 yield f"diagnosis.json has {most} among the {name} of {found['name']!r:.60}, of {n} in the table; {MADE_AGAIN}"
+
+
+def at_odds(
+    learned: Mapping[str, Any], metrics: Mapping[str, Any], certificate: Mapping[str, Any], there: Container[str]
+) -> Iterator[str]:
+    """Where records do not agree on what there is: a table, a reward, a policy of the learner's own.
+
+    Args:
+        learned: the record of the stage that learns.
+        metrics: the content of metrics.json.
+        certificate: the content of certificate.json.
+        there: the names of files that are.
+    """
+    rewarded, mend = "reward.npz" in learned["files"], "delete metrics.json, and it is made again"
+    for what, name, found in (("reward", RETRAINED, rewarded), ("policy", LEARNED, learned.get("policy", False))):
+        if (name in metrics["policies"]) is not found:
+            yield f"metrics.json and .stages/reward.json do not agree on whether a {what} was learned; {mend}"
+    if metrics.get("table") is None and "table.npz" in there:
+        yield f"metrics.json tells of no table, and table.npz is there; {mend}"
+    if not rewarded and (certificate["optimality"] is not None or "reward.npz" in there):
+        what = "no agent was retrained, but certificate.json or reward.npz is of a reward"
+        yield f"{what}; delete certificate.json and metrics.json, and they are made again"
 
 
 def left_open(

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from irl_gym.errors import InvalidDiscount, InvalidReward, IrlGymError
+from irl_gym.facts import in_lines
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.evaluation import Candidate, good_actions, judge, scale_of
 from irl_gym.judging.metrics import policy_value
 from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
-from irl_gym.judging.shares import returns_of
+from irl_gym.judging.shares import returns_of, share_of_return
 from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import certified, optimality_told
@@ -45,6 +46,8 @@ WITHIN = 1e-6
 """Share of the largest value by which two computations of one value may differ."""
 MOST_STEPS = 100_000
 """Of a horizon that values are computed again for."""
+FILES = {RETRAINED: "agent_policy.npz", LEARNED: "learned_policy.npz"}
+"""Where the policies of a table are that are judged by expert and random actions."""
 EVIDENCE = ("method", "counted", "error", "reward_error", "value_error", "errors", "hidden_state", "checked")
 """Of a table, what is told as table.npz has it now: another version may word or bound it otherwise."""
 
@@ -62,7 +65,7 @@ class Claim:
 
     def fault(self, metrics: Mapping[str, Any]) -> str | None:
         """Which entry is another, in words, with a mend; None where there is none."""
-        found = self._other(metrics, self.expected, "")
+        found = self._other(metrics, in_lines(self.expected), "")
         if found is None:
             return None
         made = self.file.endswith(".npz") or self.file == "certificate.json"
@@ -107,8 +110,8 @@ def claims(
         yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
-    taken = {key: one for key, one in stages["agent"].items() if key == "environment_steps"}
-    yield Claim(".stages/agent.json", {"training": taken})
+    taken = stages["agent"].get("environment_steps", 0)
+    yield Claim(".stages/agent.json", {"training": {"environment_steps": taken}})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
         told = table_told(table, metrics["table"].get("horizon") if known["given"] else None)
@@ -130,11 +133,8 @@ def recomputed(
 
     Raises:
         InvalidReward: the bounds that are recorded cannot be of this table, expert and reward.
-        InvalidDiscount: nor can the discount.
         InvalidPolicy: an expert of the wrong shape or content.
     """
-    if config.get("gamma") != table.mdp.gamma:
-        raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
     try:
         known = seen_with_noise(path, table) if config.get("epsilon") else expert
     except (IrlGymError, OSError):
@@ -153,8 +153,8 @@ def recomputed(
 
 
 def again(
-    config: Mapping[str, Any], metrics: Mapping[str, Any], table: Tabulation, expert: Any, agent: Any, reward: TabularReward,
-    curve: Curve,
+    config: Mapping[str, Any], metrics: Mapping[str, Any], table: Tabulation, expert: Any, agents: Mapping[str, Any],
+    reward: TabularReward | None, curve: Curve,
 ) -> tuple[list[Claim], dict[str, Any]] | None:  # fmt: skip
     """The values of a run's policies as claims, and what of metrics.json is told as computed now; None at a horizon too long.
 
@@ -163,19 +163,23 @@ def again(
         metrics: the content of metrics.json.
         table: the run's.
         expert: (S,) actions or (S, A) probabilities. Of one that is known by its episodes the value is theirs, as recorded.
-        agent: the same of the retrained agent.
-        reward: the learned one, in the table.
+        agents: the same of the retrained agent and of the learner's policy, by their names, where there is one.
+        reward: the learned one, in the table; None of a learner of policies.
         curve: what the agent earned as it trained.
 
     Raises:
+        InvalidDiscount: the table's is not the one that is configured.
         InvalidPolicy: an expert or agent of the wrong shape or content.
     """
+    if config.get("gamma") != table.mdp.gamma:
+        raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
     mdp, told, horizon = table.mdp, metrics["policies"], metrics["table"].get("horizon")
     if horizon is not None and not 0 <= horizon <= MOST_STEPS:
         return None
     given, known = known_by(config), metrics.get("expert_value") or {}
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
-    policies = {EXPERT: ("expert.npz", expert), RANDOM: ("table.npz", uniform), RETRAINED: ("agent_policy.npz", agent)}
+    policies = {EXPERT: ("expert.npz", expert), RANDOM: ("table.npz", uniform)}
+    policies |= {name: (FILES[name], policy) for name, policy in agents.items()}
     read = {
         name: _read(told[name], None if given["given"] and name == EXPERT else policy, table, horizon)
         for name, (_, policy) in policies.items()
@@ -190,7 +194,7 @@ def again(
         "policies": judge(read, scale, table, horizon, good, sampled=False),
         "score_reason": scale.reason,
         "expert_value": {} if given["given"] else scale_told(scale)["expert_value"],
-        "reward": judge_reward(reward, table, scale, horizon),
+        "reward": {} if reward is None else judge_reward(reward, table, scale, horizon),
         "training": settled(curve, scale),
         "table": {key: one for key, one in table_told(table, horizon).items() if key in EVIDENCE},
     }
@@ -201,6 +205,12 @@ def _read(row: Mapping[str, Any], policy: Any, table: Tabulation, horizon: int |
     """A policy with its value computed now, and returns as its row of metrics.json has them; so too the value where None."""
     value = row["value"] if policy is None else policy_value(table.mdp, table.reward, policy, horizon)
     return Candidate(policy, row.get("how", NOT_RECORDED), value, returns_of(row))
+
+
+def shares(policies: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """What the mean returns of a run's rows make of the share of return in each, as recorded as they are."""
+    means = {name: returns_of(row) for name, row in policies.items()}
+    return {name: {"return_share": share_of_return(one, means[EXPERT], means[RANDOM])} for name, one in means.items()}
 
 
 def with_again(told: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:

@@ -86,6 +86,7 @@ def with_doctor(run, diagnosis):
 
 
 HEALTHY = {"answer": "healthy", "why": None, "examined": "Examined: it.", "findings": []}
+RECORDED = "As recorded when each run was made. "
 UNSEEN = {**HEALTHY, "answer": "not examined", "why": "it is gone"}
 
 
@@ -93,8 +94,8 @@ UNSEEN = {**HEALTHY, "answer": "not examined", "why": "it is gone"}
     ("diagnoses", "told"),
     [
         ([None, None], "Runs A, B: Not looked at, by the earlier version of irl_gym that made it."),
-        ([HEALTHY, UNSEEN], "Run A: Healthy. Run B: Not examined: it is gone."),
-        ([HEALTHY, HEALTHY], "Runs A, B: Healthy."),
+        ([HEALTHY, UNSEEN], f"{RECORDED}Run A: Healthy. Run B: Not examined: it is gone."),
+        ([HEALTHY, HEALTHY], f"{RECORDED}Runs A, B: Healthy."),
     ],
 )
 def test_the_doctor_s_answers_are_told_with_their_runs(runs, tmp_path, diagnoses, told):

@@ -70,7 +70,7 @@ def table_run(path, env_id="FrozenLake-v1", *, seed=0, errors=2, l1=0.0, frames=
     return Run(
         path=path, config=config,
         version={"format": "irl_gym.Run/1", "irl_gym": "0.0", "command": [*SCRIPT, "--env-id", env_id, "--seed", str(seed)]},
-        env_id=env_id, actions=names, table=table, learned=result.reward, expert=expert, agent=agent,
+        env_id=env_id, actions=names, table=table, learned=result.reward, expert=expert, agents={"retrained": agent},
         certificate=certificate, metrics=metrics,
         curve=Curve(steps.astype(float), grown, grown * 1.1, grown - 0.1 * abs(level), grown * 1.1 + 0.1 * abs(level)),
         stages={"reward": {"seconds": 0.4}, "agent": {"seconds": 131.0, "environment_steps": 4000}, "report": {"seconds": 1.0}},
@@ -208,7 +208,7 @@ def stepped_run(path, *, seed=0):
     return Run(
         path=path, config=Experiment("CartPole-v1", 0.99, seed=seed).to_json(),
         version={"format": "irl_gym.Run/1", "irl_gym": "0.0", "command": None}, env_id="CartPole-v1",
-        actions=("push left", "push right"), table=None, learned=learned, expert=None, agent=None,
+        actions=("push left", "push right"), table=None, learned=learned, expert=None, agents={},
         certificate=certificate, metrics=metrics,
         curve=Curve(*np.array([[0.0, 30_000, 60_000], [20, 60, 85], [22, 200, 450], [20, 150, 420], [24, 240, 480]])),
         stages={"agent": {"seconds": 50.0, "environment_steps": 60_000}}, grid=None,

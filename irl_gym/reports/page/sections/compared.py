@@ -3,13 +3,15 @@
 import numpy as np
 from scipy.stats import spearmanr
 
-from irl_gym._typing import Indices, StateMask, Vector
+from irl_gym._typing import Indices, Matrix, StateMask, Vector
 from irl_gym.features.linear_reward import LinearReward
+from irl_gym.judging.scores import LEARNED, RETRAINED, called
 from irl_gym.mdp.arrival_rewards import paid_on_arrival
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.reports.page import maps, panels
 from irl_gym.reports.page.panels import Panel, bars, spread, telling
 from irl_gym.reports.page.scene import Scene, chosen
+from irl_gym.reports.page.sections.absent import REWARDS
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.written import aligned, counted, number, percent
 
@@ -17,10 +19,14 @@ MOST_ROWS = 40
 """Rows of the table of states in which the agent deviates."""
 FEW = 4
 """Payments of different sizes that are counted one by one."""
+ANCHORS = {RETRAINED: "agent", LEARNED: "own"}
+"""What figures of judged policies end in."""
 
 
-def rewards(scene: Scene) -> Section:
-    """The environment's reward beside the learned one, each on its own scale."""
+def rewards(learned: TabularReward | LinearReward, scene: Scene | None) -> Section:
+    """The environment's reward beside the learned one, each on its own scale; without a table, what that is made of."""
+    if scene is None or scene.learned is None:
+        return weights(learned)
     made = [
         reward_panel(f"reward-{name}", f"{title} reward", paid, scene)
         for name, title, paid in (("true", "True", scene.table.reward), ("learned", "Learned", scene.learned))
@@ -29,14 +35,14 @@ def rewards(scene: Scene) -> Section:
         "What the environment pays, which the learner never saw, beside what was recovered from the expert. Each has its own "
         "scale: many rewards make the same actions best, so the two need not look alike."
     )
-    return Section("rewards", "Rewards", lead, made)
+    return Section(*REWARDS, lead, made)
 
 
 def weights(weights: TabularReward | LinearReward) -> Section:
     """What a reward that is not known state by state is made of."""
     lead = "This environment was stepped, not tabulated, so there is no true reward state by state to compare with. "
     if weights.alpha is None:
-        return Section("rewards", "Rewards", lead)
+        return Section(*REWARDS, lead)
     alpha, features = weights.alpha, weights.features
     order = telling(alpha)
     centres = getattr(features, "centres", None)
@@ -46,7 +52,7 @@ def weights(weights: TabularReward | LinearReward) -> Section:
         "not 0. " + _left_out(order.size, alpha.size, "features")
     )
     panel = bars("weights", "Weights of the learned reward", alpha[order], where, what="weight", caption=caption, unit="weight")
-    return Section("rewards", "Rewards", lead + "The learned reward is a weighted sum of features.", [panel])
+    return Section(*REWARDS, lead + "The learned reward is a weighted sum of features.", [panel])
 
 
 def _at(centres: np.ndarray | None, i: int) -> str:
@@ -109,40 +115,46 @@ def of_states(
 
 
 def values(scene: Scene) -> Section:
-    """The expert's and the agent's value, under the true reward on one scale, and the expert's under the learned reward."""
-    true = {
-        "value-expert": ("Expert, true reward", scene.value(scene.table.reward, scene.expert)),
-        "value-agent": ("Retrained agent, true reward", scene.value(scene.table.reward, scene.agent)),
-    }
-    learned = scene.value(scene.learned, scene.expert)
-    for one in (true["value-expert"][1], learned):
-        one[~scene.seen] = np.nan
-    alike = np.concatenate([one for _, one in true.values()])
+    """Values of expert and judged policies under the true reward, on one scale; the expert's under the learned one."""
     seen = "" if scene.seen[scene.acting].all() else " Left out are states in which the expert was not seen."
-    made = [
-        _value(name, title, V, scene, f"{spread(V)}.{seen if name == 'value-expert' else ''}", alike)
-        for name, (title, V) in true.items()
-    ]
-    made.append(
-        _value(
-            "value-learned", "Expert, learned reward", learned, scene, f"{spread(learned)}, in the learned reward's unit.{seen}"
-        )
-    )
-    lead = (
-        "Expected discounted reward from each state on. The first two have one scale, so where they differ is where the agent "
-        "falls behind."
-    )
+    expert = scene.value(scene.table.reward, scene.expert)
+    expert[~scene.seen] = np.nan
+    true = {"value-expert": ("Expert, true reward", expert, seen)}
+    for name, policy in scene.agents.items():
+        true[f"value-{ANCHORS[name]}"] = f"{_title(name)}, true reward", scene.value(scene.table.reward, policy), ""
+    alike = np.concatenate([one for _, one, _ in true.values()])
+    made = [_value(name, title, V, scene, f"{spread(V)}.{more}", alike) for name, (title, V, more) in true.items()]
+    told = "Expected discounted reward from each state on"
+    where = f"where they differ is where {_agent(scene)} falls behind"
+    if scene.learned is None:
+        return Section("values", "Values", f"{told}, on one scale: {where}.", made)
+    first = "two" if len(true) == 2 else "three"
+    lead = f"{told}. The first {first} have one scale, so {where}."
+    learned = scene.value(scene.learned, scene.expert)
+    learned[~scene.seen] = np.nan
+    unit = f"{spread(learned)}, in the learned reward's unit.{seen}"
+    made.append(_value("value-learned", "Expert, learned reward", learned, scene, unit))
     if scene.place is None:
         judged = scene.acting & scene.seen
         made.append(
             panels.dots(
-                "value-both", "Each state under both rewards", true["value-expert"][1][judged], learned[judged],
+                "value-both", "Each state under both rewards", expert[judged], learned[judged],
                 scene.names(np.flatnonzero(judged)), labels=("expert's value, true reward", "expert's value, learned reward"),
                 caption="A point for each state in which the expert acts. Where the cloud rises, the learned reward ranks "
-                f"states as the true one does. {_ranked(true['value-expert'][1][judged], learned[judged])}",
+                f"states as the true one does. {_ranked(expert[judged], learned[judged])}",
             )
         )  # fmt: skip
     return Section("values", "Values", lead, made)
+
+
+def _title(name: str) -> str:
+    """What a judged policy is called above its figure."""
+    return f"{called(name)[0].upper()}{called(name)[1:]}"
+
+
+def _agent(scene: Scene) -> str:
+    """What is spoken of where all judged policies are meant."""
+    return f"the {called(next(iter(scene.agents)))}" if len(scene.agents) == 1 else "a policy"
 
 
 def _ranked(true: Vector, learned: Vector) -> str:
@@ -169,34 +181,43 @@ def _value(name: str, title: str, V: Vector, scene: Scene, told: str, alike: np.
 
 
 def policies(scene: Scene) -> Section:
-    """The expert's actions beside the agent's, and where the agent deviates."""
-    off, judged = scene.deviates, scene.acting
-    right = int((judged & ~off).sum())
-    share = percent(right / max(int(judged.sum()), 1))
-    of = counted(int(judged.sum()), "state")
-    good = "an optimal action" if (scene.good == scene.optimal)[judged].all() else "one of the expert's actions"
-    told = f"In {right:,} of {of} ({share}) the agent takes {good}."
+    """The expert's actions beside those of each judged policy, and where it deviates."""
+    off = {name: np.flatnonzero(scene.deviates(policy)) for name, policy in scene.agents.items()}
+    told = " ".join(_agrees(scene, name, int(rows.size)) for name, rows in off.items())
     where = "the cell is shaded and the action listed below" if scene.place is not None else "the action is listed below"
-    lead = f"{told} Where it does not, {where}." if off.any() else told
-    rows = np.flatnonzero(off)
-    rows = rows[np.argsort(-scene.lost[rows], kind="stable")]
-    shown = {
-        "deviations": _deviations(scene, rows[:MOST_ROWS]),
-        "left": max(rows.size - MOST_ROWS, 0),
-    }
-    return Section("policies", "Policies", lead, list(policy_panels(scene)), "policies", shown)
+    lead = f"{told} Where it does not, {where}." if any(rows.size for rows in off.values()) else told
+    tables = [_deviations(scene, name, rows) for name, rows in off.items() if rows.size]
+    return Section("policies", "Policies", lead, list(policy_panels(scene)), "policies", {"tables": tables})
 
 
-def _deviations(scene: Scene, rows: Indices) -> list[dict[str, str]]:
-    """The table of states (n,) in which the agent deviates."""
-    lost, behind = aligned(scene.lost[rows]), aligned(scene.behind[rows])
-    return [
-        {**_deviation(scene, int(row)), "lost": once, "behind": after}
-        for row, once, after in zip(rows, lost, behind, strict=True)
+def _agrees(scene: Scene, name: str, off: int) -> str:
+    """In how many states a judged policy does what is good, or would most likely do it."""
+    judged, policy = scene.acting, scene.agents[name]
+    n = int(judged.sum())
+    good = "an optimal action" if (scene.good == scene.optimal)[judged].all() else "one of the expert's actions"
+    does = "takes" if _certain(policy) else "most likely takes"
+    return f"In {n - off:,} of {counted(n, 'state')} ({percent((n - off) / max(n, 1))}) the {called(name)} {does} {good}."
+
+
+def _certain(policy: Matrix) -> bool:
+    """Has a policy (S, A) one action in each state?"""
+    return bool((policy.max(axis=1) == 1).all())
+
+
+def _deviations(scene: Scene, name: str, rows: Indices) -> dict[str, object]:
+    """The table of states (n,) in which a judged policy deviates, the costliest first."""
+    policy = scene.agents[name]
+    lost, behind = scene.lost(policy), scene.behind(policy)
+    rows = rows[np.argsort(-lost[rows], kind="stable")]
+    most = rows[:MOST_ROWS]
+    told = [
+        {**_deviation(scene, policy, int(row)), "lost": once, "behind": after}
+        for row, once, after in zip(most, aligned(lost[most]), aligned(behind[most]), strict=True)
     ]
+    return {"who": called(name), "rows": told, "left": int(rows.size - most.size)}
 
 
-def _deviation(scene: Scene, row: int) -> dict[str, str]:
+def _deviation(scene: Scene, policy: Matrix, row: int) -> dict[str, str]:
     def told(actions: np.ndarray) -> str:
         return " or ".join(scene.actions[a] for a in np.flatnonzero(actions))
 
@@ -204,15 +225,16 @@ def _deviation(scene: Scene, row: int) -> dict[str, str]:
         "state": scene.name(int(row)),
         "expert": told(chosen(scene.expert)[row]) if scene.seen[row] else "not seen",
         "optimal": told(scene.optimal[row]),
-        "agent": scene.actions[int(scene.agent[row].argmax())],
+        "agent": scene.actions[int(policy[row].argmax())],
     }
 
 
 def policy_panels(scene: Scene) -> list[Panel]:
-    """The expert's and the agent's actions on the map; elsewhere counts of both."""
+    """The actions of the expert and of each judged policy on the map; elsewhere counts of all."""
     acting, place = scene.acting, scene.place
     known = acting & scene.seen
-    sides = (("policy-expert", "Expert", scene.expert, known), ("policy-agent", "Retrained agent", scene.agent, acting))
+    sides = [("policy-expert", "Expert", scene.expert, known)]
+    sides += [(f"policy-{ANCHORS[name]}", _title(name), policy, acting) for name, policy in scene.agents.items()]
     if place is None:
         counts = {title: (chosen(policy) & shown[:, None]).sum(axis=0) for _, title, policy, shown in sides}
         told = "In how many states each takes an action; a state with several counts for each of them."
@@ -221,22 +243,27 @@ def policy_panels(scene: Scene) -> list[Panel]:
                 "policy-counts", "Actions taken", counts, scene.actions, caption=told, unit="states in which it is taken"
             )
         ]
-    several = " Several arrows: several actions." if (chosen(scene.expert)[known].sum(axis=1) > 1).any() else ""
-    captions = {
-        "policy-expert": f"The expert's action in each of {counted(int(known.sum()), 'state')}.{several}",
-        "policy-agent": f"The agent's action. Shaded: {counted(int(scene.deviates.sum()), 'state')} where it deviates.",
-    }
     if not place.arrows:
         return [
             maps.choices(
-                name, title, place, np.where(shown, policy.argmax(axis=1), np.nan), scene.actions, caption=captions[name]
+                name, title, place, np.where(shown, policy.argmax(axis=1), np.nan), scene.actions,
+                caption=_actions_told(scene, name, policy, shown),
             )
             for name, title, policy, shown in sides
-        ]
+        ]  # fmt: skip
     return [
         maps.arrows(
-            name, title, place, chosen(policy), caption=captions[name], shown=shown,
-            wrong=scene.deviates if name == "policy-agent" else None,
+            name, title, place, chosen(policy), caption=_actions_told(scene, name, policy, shown), shown=shown,
+            wrong=None if name == "policy-expert" else scene.deviates(policy),
         )
         for name, title, policy, shown in sides
     ]  # fmt: skip
+
+
+def _actions_told(scene: Scene, name: str, policy: Matrix, shown: StateMask) -> str:
+    """What the map of a policy's actions shows."""
+    several = " Several arrows: several actions." if (chosen(policy)[shown].sum(axis=1) > 1).any() else ""
+    if name == "policy-expert":
+        return f"The expert's action in each of {counted(int(shown.sum()), 'state')}.{several}"
+    own = "The agent's action." if _certain(policy) else f"Its likeliest action, and those at least half as likely.{several}"
+    return f"{own} Shaded: {counted(int(scene.deviates(policy).sum()), 'state')} where it deviates."

@@ -8,14 +8,13 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
-from irl_gym.judging.scores import RETRAINED
+from irl_gym.judging.scores import agent_of, the
 from irl_gym.reports.page.maps import Map, geometry
 from irl_gym.reports.page.sections.absent import EPISODES
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.runs.films import MOST_BYTES, Film, Moment
 from irl_gym.written import counted, sentence_of, state_called, sum_of
 
-TITLES = {"expert": "Expert", "agent": "Retrained agent"}
 ENDS = {
     "terminated": "The episode ends by itself.",
     "truncated": "A time limit ends the episode.",
@@ -41,7 +40,8 @@ def episodes(films: Mapping[str, Film], place: Map | None, policies: Mapping[str
         "One episode of each, from the same kind of start. Play them, or step with the buttons; the slider below each goes to "
         "any moment."
     )
-    titles = TITLES if RETRAINED in policies else TITLES | {"agent": "Learner's policy"}
+    shown = the(agent_of(policies)).removeprefix("the ")
+    titles = {"expert": "Expert", "agent": f"{shown[0].upper()}{shown[1:]}"}
     told = [_told(name, titles.get(name, name), film) for name, film in films.items()]
     return Section(*EPISODES, lead, (), "episodes", {"players": told}, {"episodes": {"players": players}})
 

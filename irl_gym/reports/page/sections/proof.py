@@ -47,7 +47,7 @@ def doctor(diagnosis: Mapping[str, Any], place_name: Callable[[int, int | None],
     """The doctor's answer, and findings with their mends."""
     findings = [finding(one, place_name, given=given) for one in diagnosis["findings"]]
     lead = "What a careful reader would ask of this reward, and what to do about it. " if findings else ""
-    lead += f"{told_answer(diagnosis)} {diagnosis['examined']}"
+    lead += f"As recorded when the run was made: {told_answer(diagnosis)} {diagnosis['examined']}"
     return Section(*DOCTOR, lead.strip(), (), "doctor", {"findings": findings})
 
 

@@ -7,7 +7,7 @@ from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.judging import measures
 from irl_gym.judging.confirmation import loss_told
 from irl_gym.judging.measures import explained, no_score, shown
-from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, called, others, score_of
+from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, called, others, score_of, the
 from irl_gym.judging.shares import MUCH, judged, judgements, returns_of
 from irl_gym.learners.linear_programs.proofs.proven import ROUNDING
 from irl_gym.mdp.sampling_error import estimated_table
@@ -46,15 +46,16 @@ def verdict(metrics: Mapping[str, Any], *, recomputed: bool) -> dict[str, Any]:
     score, share = agent.get("score"), reward.get("worst_tie_regret_share")
     optimal, mood = reward.get("expert_optimal"), judged(metrics["policies"], metrics.get("table")).mood
     lost = "" if share is None else f"{sum_of(max(reward['worst_tie_regret'], 0.0))} of value, as a share "
+    whose = "the agent's" if agent_of(metrics["policies"]) == RETRAINED else "the policy's"
     figures = [
         {
-            "label": "the agent's score",
+            "label": f"{whose} score",
             "value": score_of(score),
             "note": "random actions are 0, the expert is 1" if score is not None else no_score(metrics),
             "mood": mood,
         },
         {
-            "label": "the agent's mean return",
+            "label": f"{whose} mean return",
             "value": number(agent.get("mean_return")),
             "note": _returns(metrics),
             "mood": mood,
@@ -163,14 +164,14 @@ def _who(metrics: Mapping[str, Any]) -> str:
     name = agent_of(metrics["policies"])
     if name == RETRAINED:
         return "The agent that saw only the recovered reward"
-    return f"The policy {name} ({how(metrics['policies'][name])})"
+    return f"T{the(name)[1:]} ({how(metrics['policies'][name])})"
 
 
 def _beside(metrics: Mapping[str, Any]) -> str:
     """The other policies that are no references."""
     rows, spoken = metrics["policies"], agent_of(metrics["policies"])
     return "".join(
-        f" Beside it, {name} ({how(rows[name])}) has a score of {score_of(rows[name].get('score'))} and a mean return of "
+        f" Beside it, {the(name)} ({how(rows[name])}) has a score of {score_of(rows[name].get('score'))} and a mean return of "
         f"{_mean(returns_of(rows[name]))}."
         for name in others(rows)
         if name != spoken

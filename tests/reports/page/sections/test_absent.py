@@ -15,6 +15,7 @@ from irl_gym.reports.page.sections.section import Section
 
 WHY = {"ambiguity": {name: f"of {name}" for name in ("no_path", "no_widths")}}
 WITHOUT = {
+    "learned": ({"learned": None}, "rewards", "The learner gives a policy and no reward. So nobody was retrained"),
     "curve": ({"curve": NO_CURVE}, "learning", "No agent was trained step by step"),
     "films": ({"films": {}}, "episodes", "No episode of this run was filmed."),
     "lambda_path": ({"lambda_path": None}, "lambda", "was not worked out for this run. Of no_path."),
@@ -35,6 +36,11 @@ def test_a_section_that_is_absent_says_why(run, tmp_path, need):
     of = stepped_run(tmp_path) if need == "told_of_table" else replace(run, **changes)
     (section,) = (one for one in sections_of(RunContents(of), of) if one.name == name)
     assert told in section.lead and not section.panels and not section.shown
+
+
+def test_what_goes_with_a_reward_is_said_to_be_absent_once(run):
+    without = replace(run, learned=None, curve=NO_CURVE, lambda_path=None, widths=None, films={})
+    assert [one.name for one in sections_of(without)][:5] == ["summary", "rewards", "values", "policies", "episodes"]
 
 
 def test_a_run_without_a_table_has_no_sections_of_states(tmp_path):

@@ -11,10 +11,10 @@ from enumeration_envs import Corridor
 from gymnasium import spaces
 from mended import told, unsaid
 
-from irl_gym.commands import screens
 from irl_gym.commands.arguments import Arguments
-from irl_gym.commands.keyboard import controls_of
-from irl_gym.commands.playing import Play, Turn, free_dataset, stage
+from irl_gym.commands.demonstrating import screens
+from irl_gym.commands.demonstrating.keyboard import controls_of
+from irl_gym.commands.demonstrating.playing import Play, Turn, free_dataset, stage
 from irl_gym.commands.terminal import OPTIONS
 
 pytestmark = pytest.mark.usefixtures("unchecked")
@@ -130,7 +130,15 @@ CASES = [
      lambda _: asked("--env-kwargs", "8x8"), lambda _: asked("--env-kwargs", "map_name=8x8").env_kwargs == {"map_name": "8x8"}),
 ]  # fmt: skip
 ELSEWHERE = "Learn from it with"  # scripts/test_play.py: test_the_script_says_what_happened_and_how_to_learn_from_it
-FILES = ["playing.py", "screens.py", "keyboard.py", "arguments.py", "doctor.py", "terminal_report.py", "comparison_page.py"]
+FILES = [
+    "playing.py",
+    "screens.py",
+    "keyboard.py",
+    "arguments.py",
+    "diagnoses/doctor.py",
+    "terminal_report.py",
+    "comparison_page.py",
+]
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])

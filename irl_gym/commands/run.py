@@ -125,6 +125,7 @@ def _told(arguments: Arguments, command: Sequence[str], shared: Path, *, quiet: 
 def _kept(arguments: Arguments, shared: Path) -> "tuple[Experiment, Path]":
     """The experiment and its folder; a file is made a dataset there, unless it was before."""
     from irl_gym.files.own_files import held
+    from irl_gym.files.run_folder import RunFolder
     from irl_gym.runs.experiment import parse_keywords
     from irl_gym.runs.identity import claim
     from irl_gym.runs.named_parts import environment_of
@@ -144,6 +145,7 @@ def _kept(arguments: Arguments, shared: Path) -> "tuple[Experiment, Path]":
         episodes = log.episodes(env)
         with held(out, f"another process works in {out}: wait for it, or choose another --out."):
             claim(out, asked.to_json())
+            RunFolder(out, asked.to_json())  # whatever goes wrong from now on, the folder is this run's
             log.write(episodes, env, log.dataset_id, root)
     return asked, out
 

@@ -4,11 +4,11 @@ A subcommand reads its arguments before it imports what it works with: --help, a
 """
 
 import importlib
+import importlib.metadata
 import os
 import sys
 from collections.abc import Sequence
 
-from irl_gym import __version__
 from irl_gym.commands.terminal import checked_name, print_error
 from irl_gym.errors import InvalidParameter
 
@@ -37,7 +37,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(usage())
         return 0
     if name == "--version":
-        print(f"irl-gym {__version__}")
+        print(f"irl-gym {importlib.metadata.version('irl_gym')}")
         return 0
     try:
         if name.startswith("-"):

@@ -5,19 +5,27 @@ A million steps take seconds, in memory that does not grow; an export that was s
 For example:
     irl-gym export --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --steps 1000000 --dataset-id lake/best-v0
     irl-gym export --env-id CartPole-v1 --expert ppo --epsilon 0.1 --dataset-id cart/noisy-v0 --format arrow
+    irl-gym export --env-id FrozenLake-v1 --csv log.csv --observation-columns cell --dataset-id me/log-v0
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from rich.console import Console
 from rich.text import Text
 
 from irl_gym.commands.arguments import parse_reveal
+from irl_gym.commands.csv_columns import Log
 from irl_gym.commands.terminal import UNSET, exit_code, print_error, read_arguments, stage_bars
-from irl_gym.errors import IrlGymError
+from irl_gym.errors import InvalidParameter, IrlGymError
+
+OF_EXPERT = (
+    "max_states", "expert", "expert_normalize", "epsilon", "episodes", "steps", "max_episode_steps", "total_timesteps", "gamma",
+    "seed",
+)  # fmt: skip
+"""Options that a file leaves nothing to say of."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,21 @@ class Arguments:
     """One file; or a folder an episode, which needs the extra `data`."""
     root: Annotated[Path | None, UNSET] = None
     """Minari's root folder; the default is the one in force."""
+    log: Log = field(default_factory=Log)
+    """Or episodes in a file, in place of an expert's."""
+
+    def check_no_expert(self) -> None:
+        """Check that nothing is asked of an expert, where the episodes are in a file.
+
+        Raises:
+            InvalidParameter: something is.
+        """
+        for one in fields(self):
+            if one.name in OF_EXPERT and getattr(self, one.name) != one.default:
+                raise InvalidParameter(
+                    f"csv is {self.log.csv}, but {one.name} is {getattr(self, one.name)!r}: expected the episodes of the file "
+                    "as they are. Leave the others out."
+                )
 
 
 def command(words: Sequence[str]) -> int:
@@ -68,36 +91,9 @@ def command(words: Sequence[str]) -> int:
 
 def main(arguments: Arguments) -> int:
     """Export, and say what there is."""
-    from irl_gym.commands.demonstrating.demonstrators import Recording
-    from irl_gym.demonstrations.datasets import described
-    from irl_gym.demonstrations.export import Amount, export_dataset
-    from irl_gym.demonstrations.minari_files import unkept
-    from irl_gym.runs.experiment import parse_keywords
-    from irl_gym.runs.named_parts import environment_of
-
     console = Console(soft_wrap=True)
     try:
-        amount = Amount(
-            1_000 if arguments.episodes is None and arguments.steps is None else arguments.episodes, arguments.steps
-        )
-        recording = Recording(
-            arguments.expert, arguments.gamma, arguments.epsilon, arguments.seed, arguments.max_episode_steps,
-            arguments.total_timesteps, arguments.max_states, arguments.expert_normalize,
-        )  # fmt: skip
-        keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
-        env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
-        metadata = {**recording.metadata(arguments.env_id), "code_permalink": "irl-gym export"}
-        lost = unkept(env.spec)
-        if lost:
-            metadata["description"] += f" {lost}"
-        about = described(
-            arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
-        )
-        with stage_bars(console) as show:
-            dataset = export_dataset(
-                lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
-                about, amount, recording.plan(env), root=arguments.root, on_progress=show,
-            )  # fmt: skip
+        dataset, lost = exported(arguments, console)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last episodes written.")
         return 130
@@ -112,3 +108,43 @@ def main(arguments: Arguments) -> int:
     if lost:
         console.print(Text(f"{lost} Who learns from it names one with --env-id."))
     return 0
+
+
+def exported(arguments: Arguments, console: Console) -> tuple[Any, str | None]:
+    """The dataset, of an expert's episodes or of a file's; and what it cannot say of where they were recorded.
+
+    Raises:
+        IrlGymError: no such environment, expert or file, or an id that is taken.
+    """
+    from irl_gym.commands.demonstrating.demonstrators import Recording
+    from irl_gym.demonstrations.datasets import described
+    from irl_gym.demonstrations.export import Amount, export_dataset
+    from irl_gym.demonstrations.minari_files import unkept
+    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.named_parts import environment_of
+
+    amount = Amount(1_000 if arguments.episodes is None and arguments.steps is None else arguments.episodes, arguments.steps)
+    recording = Recording(
+        arguments.expert, arguments.gamma, arguments.epsilon, arguments.seed, arguments.max_episode_steps,
+        arguments.total_timesteps, arguments.max_states, arguments.expert_normalize,
+    )  # fmt: skip
+    keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
+    env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
+    lost = unkept(env.spec)
+    if arguments.log.csv is not None:
+        arguments.check_no_expert()
+        episodes = arguments.log.episodes(env)
+        how = {"data_format": arguments.format}
+        return arguments.log.write(episodes, env, arguments.dataset_id, arguments.root, **how), lost
+    metadata = {**recording.metadata(arguments.env_id), "code_permalink": "irl-gym export"}
+    if lost:
+        metadata["description"] += f" {lost}"
+    about = described(
+        arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
+    )
+    with stage_bars(console) as show:
+        dataset = export_dataset(
+            lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
+            about, amount, recording.plan(env), root=arguments.root, on_progress=show,
+        )  # fmt: skip
+    return dataset, lost

@@ -4,7 +4,7 @@ For example:
     irl-gym run --env-id Taxi-v4
     irl-gym run --env-id CartPole-v1 --learner trajectory-lp
     irl-gym run --env-id my_env:MyEnv-v0 --seeds 0-4 --out runs/mine
-    irl-gym run --env-id FrozenLake-v1 --csv log.csv --observation-columns s --action-column a
+    irl-gym run --env-id FrozenLake-v1 --csv log.csv --observation-columns cell --action-column move
     irl-gym run --dataset irl_gym/taxi-v4-expert-v0 --dataset-root DIR --learner feature-lp
 """
 

@@ -87,9 +87,9 @@ def tabulated(arguments: Arguments, tell: Callable[[float], None]) -> list[str]:
     )  # fmt: skip
     by = asked.by(arguments.seed)
     try:
-        if asked.bins:
+        if (cells := asked.cells) is not None:
             method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
-            table = discretize(env, gamma=given.gamma, bins=asked.cells, seed=arguments.seed, on_progress=tell, **method)
+            table = discretize(env, gamma=given.gamma, bins=cells, seed=arguments.seed, on_progress=tell, **method)
         else:
             table = tabulate(
                 env, gamma=given.gamma, by=by, seed=arguments.seed, progress=lambda done, of: tell(done / max(of, 1))

@@ -7,10 +7,10 @@ READY := $(VENV)/.ready
 .PHONY: demo paper test lint types unit wheel bars clean
 
 demo: $(READY)  ## recover a reward on FrozenLake 8x8, retrain PPO on it, print the report
-	$(BIN)/python scripts/recover_and_retrain.py --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --out runs/demo
+	$(BIN)/irl-gym run --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --out runs/demo
 
 paper: $(READY)  ## reproduce the experiments of Ng & Russell (2000): numbers, verdicts, figures (about 6 minutes)
-	$(BIN)/python scripts/reproduce_ng_russell.py
+	$(BIN)/irl-gym reproduce ng-russell-2000
 
 test: lint types unit wheel  ## everything CI checks
 
@@ -42,7 +42,7 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python scripts/reward_distances.py
 	$(BIN)/python scripts/measure_environments.py
 	$(BIN)/python scripts/measure_demonstrations.py
-	$(BIN)/python scripts/reproduce_ng_russell.py
+	$(BIN)/irl-gym reproduce ng-russell-2000
 
 # torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.
 $(READY): pyproject.toml constraints.txt

@@ -1,6 +1,8 @@
 """Checks of arguments that many places share: a number in a range, an array of floats, a sparse matrix, discrete actions."""
 
 import numbers
+import os
+import sys
 from typing import Any
 
 import numpy as np
@@ -225,3 +227,13 @@ def shown_sum(total: float) -> str:
     """A sum that is not 1, in enough digits to see it."""
     told = f"{total:.9g}"
     return told if told != "1" else f"1 {'+' if total > 1 else '-'} {abs(total - 1):.1g}"
+
+
+def no_module(name: str) -> str:
+    """What is said of a module that Python does not find: where it was looked for, and what to do."""
+    here = os.getcwd()
+    places = f"in {here} and among what is installed" if {"", here} & {*sys.path} else "among what is installed"
+    return (
+        f"there is no module {name!r}, which was looked for {places}: expected one that Python finds. Run irl-gym in the "
+        "folder that has it, or install it."
+    )

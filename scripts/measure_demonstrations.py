@@ -20,7 +20,7 @@ from rich.table import Table
 
 from irl_gym import Experiment, FiniteLP, IrlGymError, policy_iteration, recover_and_retrain, tabulate, write_minari
 from irl_gym.agents.noise import noisy
-from irl_gym.commands.demonstrators import Recording
+from irl_gym.commands.demonstrating.demonstrators import Recording
 from irl_gym.judging.metrics import normalised_score, policy_value, random_value
 from irl_gym.mdp.policies import load_actions
 

@@ -1,49 +1,8 @@
-"""Write the page of a finished run again: report.html, with everything in it.
-
-For example:
-    python scripts/report.py --run runs/demo
-"""
+"""Write the page of a run again: `irl-gym report`, called in a clone."""
 
 import sys
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
 
-import tyro
-from rich.console import Console
-from rich.text import Text
-
-from irl_gym import IrlGymError
-from irl_gym.commands.terminal import OPTIONS, UNSET, check_writable, exit_code, print_error
-from irl_gym.reports.page.report import write_report
-from irl_gym.runs.run import read_run
-
-
-@dataclass(frozen=True)
-class Arguments:
-    """Write report.html of a finished run."""
-
-    run: Path
-    """The folder of the run."""
-    out: Annotated[Path | None, UNSET] = None
-    """The file; the default is report.html in that folder."""
-
-
-def main(arguments: Arguments) -> int:
-    """Read the run and write its page."""
-    out = arguments.out or arguments.run / "report.html"
-    try:
-        if arguments.out is not None:
-            check_writable(out)
-        run = read_run(arguments.run)
-        write_report(run, out)
-    except (IrlGymError, OSError) as error:
-        print_error(error)
-        return 2
-    Console(soft_wrap=True).print(Text(" ".join(filter(None, (f"Wrote {out}.", run.caution)))))
-    return 0
-
+from irl_gym.commands.door import main
 
 if __name__ == "__main__":
-    asked = tyro.cli(Arguments, description=__doc__, config=OPTIONS)
-    sys.exit(exit_code(lambda: main(asked)))
+    sys.exit(main(["report", *sys.argv[1:]]))

@@ -5,7 +5,7 @@ from own_learners import Both, Copycat, Pusher
 from irl_gym.agents.planners import SB3, ValueIteration
 from irl_gym.runs.experiment import Experiment
 
-COMMAND = ("python", "scripts/recover_and_retrain.py", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
+COMMAND = ("irl-gym", "run", "--env-kwargs", 'desc=["SG"]', "--out", "a folder")
 LAKE = {"env_kwargs": {"is_slippery": False}, "episodes": 10, "eval_episodes": 10, "num_envs": 16}
 
 

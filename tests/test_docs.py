@@ -20,15 +20,24 @@ from stopped import HANG
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("wrap-any-environment", "bring-your-own-demonstrations", "reward-distances", "ambiguity", "doctor", "security")
-SCRIPTS = ("recover_and_retrain.py", "export_dataset.py", "play.py", "reward_distances.py", "measure_ambiguity.py", "doctor.py")
-HELP = """
+SCRIPTS = ("reward_distances.py", "measure_ambiguity.py")
+LEARNERS = ("finite-lp", "feature-lp", "trajectory-lp", "module:Class")
+HELP = f"""
 import contextlib, runpy, sys
-for script in sys.argv[1:]:
+from irl_gym.commands import door
+for script in {SCRIPTS}:
     print("===", script, flush=True)
     sys.argv = [script, "--help"]
     with contextlib.suppress(SystemExit):
         runpy.run_path(script, run_name="__main__")
+for name in door.SUBCOMMANDS:
+    print("===", name, flush=True)
+    more = {{"run": [["--learner", one] for one in {LEARNERS}], "reproduce": [["ng-russell-2000"]]}}
+    for words in more.get(name, [[]]):
+        with contextlib.suppress(SystemExit):
+            door.main([name, *words, "--help"])
 """
+COMMAND = r"(?:python scripts/|irl-gym )([\w.]+)([^\n|]*)"
 CHILD = """
 import contextlib, io, json, sys, traceback
 page, printed = {"__name__": "page"}, []
@@ -93,11 +102,11 @@ def page(name):
 
 @functools.cache
 def options():
-    """Script -> the options that it knows."""
-    done = subprocess.run([sys.executable, "-c", HELP, *SCRIPTS], cwd=ROOT / "scripts", capture_output=True, text=True)
-    helps = done.stdout.split("=== ")[1:]
-    assert len(helps) == len(SCRIPTS), done.stderr
-    return {script: set(re.findall(r"--[a-z][-a-z0-9]*", text)) for script, text in zip(SCRIPTS, helps, strict=True)}
+    """Script or subcommand -> the options that it knows."""
+    done = subprocess.run([sys.executable, "-c", HELP], cwd=ROOT / "scripts", capture_output=True, text=True)
+    helps = [text.partition("\n") for text in done.stdout.split("=== ")[1:]]
+    assert len(helps) > len(SCRIPTS), done.stderr
+    return {name: set(re.findall(r"--[a-z][-a-z0-9]*", text)) for name, _, text in helps}
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -111,6 +120,7 @@ def test_blocks_print_what_the_page_says(name, tmp_path):
     for block in found:
         if block.language == "sh" and block.printed is not None:
             command = block.code.replace("python scripts/", f"{sys.executable} {ROOT}/scripts/")
+            command = command.replace("irl-gym ", f"{sys.executable} -m irl_gym ")
             printed, more = run(command, tmp_path, shell=True)
             errors += more
             ran.append((block, printed))
@@ -124,7 +134,7 @@ def test_blocks_print_what_the_page_says(name, tmp_path):
 
 @pytest.mark.parametrize("name", PAGES)
 def test_commands_have_only_options_that_exist(name):
-    commands = [match for block in blocks(page(name)) for match in re.findall(r"python scripts/(\w+\.py)([^\n|]*)", block.code)]
+    commands = [match for block in blocks(page(name)) for match in re.findall(COMMAND, block.code)]
     assert commands
     unknown = [
         (script, one)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 NO_MENDS = {
     "Run it again", "Put your own in place of each", "Move the slider to walk through the pieces", "Play them",
     "look at it before you run it",  # how a page is used
-    "give or take", "lower left and upper right", "import irl_gym",  # no sentences
+    "give or take", "lower left and upper right", "import irl_gym", "Run | None",  # no sentences
     "Give the expert as the (S", "Leave out the actions that it takes by mistake",  # of rewards on steps, which explain all
 }  # fmt: skip
 """What looks like a mend."""

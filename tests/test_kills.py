@@ -20,7 +20,8 @@ SCRIPTS = Path(__file__).parents[1] / "scripts"
 FORKING = """
 import importlib, json, os, runpy, signal, sys, traceback
 changes, script = json.loads(sys.argv[1]), sys.argv[2]
-runpy.run_path(script, run_name="imported")
+for name in ("loop.pipeline", "reports.terminal_report", "commands.demonstrating.demonstrators"):  # once, not in each child
+    importlib.import_module(f"irl_gym.{name}")
 for path, value in changes.items():
     module, _, name = path.partition(":")
     setattr(importlib.import_module(module), name, value)

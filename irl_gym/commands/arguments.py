@@ -1,31 +1,29 @@
-"""What the loop's command line asks for, group by group, and the experiment that it stands for."""
+"""What the loop's command line asks for, group by group, and the experiment that it stands for.
+
+The records are read before anything is imported that they stand for: what makes something of them imports it.
+"""
 
 import ast
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
-from gymnasium import spaces
-
-from irl_gym.agents.expert_files import FromFile
-from irl_gym.agents.planners import Planner
+from irl_gym.commands.csv_columns import Log
 from irl_gym.commands.learning_arguments import TAKEN, Learning
 from irl_gym.commands.terminal import UNSET
-from irl_gym.demonstrations.endings import AfterEnd
+from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.errors import InvalidParameter
-from irl_gym.learners.registry import learner_of
-from irl_gym.runs.experiment import Experiment, parse_keywords
-from irl_gym.runs.named_parts import (
-    KNOWN,
-    PlannerName,
-    Reveals,
-    environment_of,
-    planner_named,
-    steps_only,
-)
-from irl_gym.tables.counted.counting import Interaction
-from irl_gym.tables.enumeration.table import Enumeration
+from irl_gym.runs.choices import KNOWN, PlannerName, Reveals
+
+if TYPE_CHECKING:
+    from irl_gym.agents.planners import Planner
+    from irl_gym.runs.experiment import Experiment
+    from irl_gym.tables.tabulate import By
+
+MOST_SEEDS = 26
+"""Runs that a page sets side by side."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,16 @@ class Table:
     samples: int = 0
     """Points drawn in each cell, whose steps are counted; 0 for the step from its centre, shared between neighbours."""
 
-    def by(self, seed: int) -> Enumeration | Interaction | None:
+    @property
+    def cells(self) -> int | tuple[int, ...] | None:
+        """Cells along each coordinate, or one number for all; None for no table of cells."""
+        return self.bins[0] if len(self.bins) == 1 else self.bins or None
+
+    def by(self, seed: int) -> "By | None":
         """How a table is made."""
+        from irl_gym.tables.counted.counting import Interaction
+        from irl_gym.tables.enumeration.table import Enumeration
+
         if self.steps is not None and self.table != "sample":
             raise InvalidParameter(f"steps is {self.steps}, but table is {self.table!r}: expected --table sample with it.")
         if self.max_states is not None and self.table == "sample":
@@ -137,22 +143,52 @@ class Arguments:
     """How the table of its transitions is made."""
     demonstrations: Demonstrations = Demonstrations()
     """Who shows what is wanted."""
+    log: Log = field(default_factory=Log)
+    """Or episodes in a file."""
     learning: Learning = field(default_factory=Learning)
     """How the reward is recovered."""
     retraining: Retraining = Retraining()
     """Who learns from the recovered reward."""
     seed: int = 0
     """Of everything that is drawn."""
+    seeds: Annotated[str | None, UNSET] = None
+    """Several runs, such as 0-4 or 0,3,7: each is kept in a folder seed-N of --out, and they are taken together."""
     out: Annotated[Path | None, UNSET] = None
     """Where the run is kept, and continued if it was killed. The default is a folder of its own under runs/."""
 
-    def experiment(self) -> Experiment:
+    def learning_from(self, dataset: str, root: str | None) -> "Arguments":
+        """The same, learning from the dataset that was made of the file in place of the file.
+
+        Raises:
+            InvalidParameter: no environment, or another source of demonstrations beside the file.
+        """
+        shown = self.demonstrations
+        if self.environment.env_id is None:
+            raise InvalidParameter(
+                f"csv is {self.log.csv}, and no environment is named: expected the one that it was recorded in. Name it with "
+                "--env-id."
+            )
+        if shown.dataset is not None or shown.expert is not None or shown.epsilon:
+            raise InvalidParameter(
+                f"csv is {self.log.csv}, but a dataset, an expert or epsilon is given too: expected the episodes of the file "
+                "as they are. Leave the others out."
+            )
+        return replace(self, log=Log(), demonstrations=replace(shown, dataset=dataset, dataset_root=root))
+
+    def experiment(self) -> "Experiment":
         """What the arguments ask for.
 
         Raises:
             InvalidParameter: arguments that contradict each other, or are outside their range.
             UnknownEnvironment, DatasetMissing: no such environment or dataset, where a learner has to know it.
         """
+        from gymnasium import spaces
+
+        from irl_gym.agents.expert_files import FromFile
+        from irl_gym.learners.registry import learner_of
+        from irl_gym.runs.experiment import Experiment, parse_keywords
+        from irl_gym.runs.named_parts import environment_of, planner_named, steps_only
+
         given, shown = self.environment, self.demonstrations
         env_id = given.env_id or (None if shown.dataset else "FrozenLake-v1")
         env_kwargs, reveal = parse_keywords(given.env_kwargs), parse_reveal(given.reveal)
@@ -175,23 +211,44 @@ class Arguments:
                 features = self.learning.phi(env)
         shaped = self.retraining.shaping and not control
 
-        def planner(name: PlannerName | None, *, advantages: bool = False) -> Planner | None:
+        def planner(name: PlannerName | None, *, advantages: bool = False) -> "Planner | None":
             if name is None and control:
                 name = "ppo"
             steps = self.retraining.total_timesteps
             return planner_named(name, steps, advantages=advantages, control=control, discrete=discrete)
 
-        file, bins = shown.file, self.table.bins
+        file = shown.file
         named = planner(cast("PlannerName | None", shown.expert)) if file is None else None
         expert = named if file is None else FromFile.at(file, shown.expert_normalize)
         return Experiment(
             env_id, given.gamma, env_kwargs, given.start_seeds, reveal, self.table.by(self.seed),
-            bins[0] if len(bins) == 1 else bins or None, self.table.samples, shown.dataset, shown.dataset_root,
+            self.table.cells, self.table.samples, shown.dataset, shown.dataset_root,
             shown.trust_dataset,
             shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, features=features,
             inner=planner(self.learning.inner), shaping=self.retraining.shaping,
             retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
         )  # fmt: skip
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds, given as text: numbers and ranges with commas between them, such as 0-4 or 0,3,7.
+
+    Raises:
+        InvalidParameter: anything else, a seed twice, or more than a page sets side by side.
+    """
+    found: list[int] = []
+    for part in text.split(","):
+        ends = re.fullmatch(r"\s*(\d{1,9})\s*(?:-\s*(\d{1,9})\s*)?", part)
+        first, last = (0, -1) if ends is None else (int(ends[1]), int(ends[2] or ends[1]))
+        if last < first or last - first >= MOST_SEEDS or {*found} & {*range(first, last + 1)}:
+            found = []
+            break
+        found += range(first, last + 1)
+    if not 0 < len(found) <= MOST_SEEDS:
+        raise InvalidParameter(
+            f"seeds is {text!r:.80}: expected whole numbers, each once and at most {MOST_SEEDS}, such as 0-4 or 0,3,7."
+        )
+    return found
 
 
 def parse_reveal(parts: Sequence[str]) -> Reveals:

@@ -1,18 +1,22 @@
 """What the loop's command line asks for of learners: which one, and its options; an option of another one is refused."""
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_type_hints
 
-import gymnasium as gym
+from tyro.conf import Suppress
 
 from irl_gym.commands.terminal import UNSET
 from irl_gym.errors import InvalidParameter
-from irl_gym.features.feature_maps import FeatureMap
-from irl_gym.learners.linear_programs.feature import FeatureLP
-from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
-from irl_gym.learners.needs import Needs
-from irl_gym.runs.named_parts import FeatureName, PlannerName, features_named
+from irl_gym.runs.choices import FeatureName, PlannerName
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+
+    from irl_gym.features.feature_maps import FeatureMap
+    from irl_gym.learners.linear_programs.feature import FeatureLP
+    from irl_gym.learners.linear_programs.finite import FiniteLP
+    from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+    from irl_gym.learners.needs import Needs
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Learning:
     """How the reward is recovered."""
 
     learner: str = "finite-lp"
-    """Ng & Russell's section 3 (finite-lp), 4 (feature-lp) or 5 (trajectory-lp); or module:Class of your own."""
+    """finite-lp, feature-lp, trajectory-lp (Ng & Russell's sections 3 to 5), or module:Class; with --help its options show."""
     options: Annotated[tuple[str, ...], UNSET] = ()
     """Of a learner of your own: name=value ..., or one json object."""
     l1: float | Literal["auto"] = 0.0
@@ -48,7 +52,7 @@ class Learning:
     time_limit: Annotated[float | None, UNSET] = None
     """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
 
-    def check(self, needs: Needs | None = None) -> None:
+    def check(self, needs: "Needs | None" = None) -> None:
         """Check that no option is given which the learner does not have.
 
         Args:
@@ -67,8 +71,10 @@ class Learning:
                     f"option: expected {expected} with it. Leave it out."
                 )
 
-    def phi(self, env: gym.Env) -> FeatureMap:
+    def phi(self, env: "gym.Env") -> "FeatureMap":
         """The features that are asked for."""
+        from irl_gym.runs.named_parts import features_named
+
         return features_named(self.features, env, size=self.size, coordinates=self.coordinates or None)
 
     @property
@@ -76,8 +82,10 @@ class Learning:
         """The margin cap as learners take it."""
         return None if self.margin_cap == "none" else self.margin_cap
 
-    def finite(self, from_episodes: bool) -> FiniteLP:
+    def finite(self, from_episodes: bool) -> "FiniteLP":
         """The learner of section 3."""
+        from irl_gym.learners.linear_programs.finite import FiniteLP
+
         slack = 1.0 if from_episodes and self.reward_on == "state" else None
         if self.slack != "auto":
             slack = None if self.slack == "none" else self.slack
@@ -86,8 +94,11 @@ class Learning:
             time_limit=self.time_limit,
         )  # fmt: skip
 
-    def linear(self, env: gym.Env, control: bool, seed: int) -> FeatureLP | TrajectoryLP:
+    def linear(self, env: "gym.Env", control: bool, seed: int) -> "FeatureLP | TrajectoryLP":
         """The learner of section 4 or 5."""
+        from irl_gym.learners.linear_programs.feature import FeatureLP
+        from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+
         phi, l1 = self.phi(env), cast("Any", self.l1)
         if self.learner == "feature-lp":
             return FeatureLP(phi, self.sample, margin_cap=self.cap, l1=l1, seed=seed, time_limit=self.time_limit)
@@ -106,7 +117,17 @@ OF_PART = {"features": ("features", "size", "coordinates"), "environment": ("inn
 """The options that make a part of the problem."""
 
 
-def taken_by_own(needs: Needs | None) -> tuple[str, ...]:
+def taken_by_own(needs: "Needs | None") -> tuple[str, ...]:
     """The options of a learner of the user's own: its own, and those of parts that it needs."""
     parts = OF_PART if needs is None else [part for part in OF_PART if part in needs.parts]
     return ("options", *(option for part in parts for option in OF_PART[part]))
+
+
+def for_help(learner: str) -> type[Learning]:
+    """The record without the options that a learner has not: what --help shows."""
+    hints, taken = get_type_hints(Learning, include_extras=True), TAKEN.get(learner) or taken_by_own(None)
+    others = [one for one in fields(Learning) if one.name not in ("learner", *taken)]
+    made = {one.name: one.default for one in others}
+    hidden = {one.name: Annotated[hints[one.name], Suppress] for one in others}
+    told = {"__doc__": Learning.__doc__, "__module__": Learning.__module__, "__annotations__": hidden}
+    return dataclass(frozen=True)(type("Learning", (Learning,), {**told, **made}))

@@ -1,11 +1,13 @@
-"""What all scripts say in a terminal in the same way: how far a stage is, and what went wrong."""
+"""What all subcommands do in a terminal in the same way: read arguments, say how far a stage is, and what went wrong."""
 
 import contextlib
+import difflib
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -19,6 +21,32 @@ UNSET = arg(help_behavior_hint="")
 """What stands for "not given" is not shown in --help; the text says what happens then."""
 OPTIONS = (OmitArgPrefixes, DisallowNone)
 """How tyro reads arguments: groups of them give no prefix to their flags, and nobody types None."""
+Record = TypeVar("Record")
+
+
+def read_arguments(kind: type[Record], words: Sequence[str], subcommand: str, about: str | None) -> Record:
+    """The arguments of a subcommand, as a record; --help and what cannot be read end the process, as tyro has it.
+
+    Args:
+        kind: a dataclass, whose fields are the options.
+        words: of the command line, behind the subcommand.
+        subcommand: its name.
+        about: what --help says first.
+    """
+    return tyro.cli(kind, args=[*words], prog=f"irl-gym {subcommand}", description=about, config=OPTIONS)
+
+
+def checked_name(what: str, name: str, known: Collection[str]) -> str:
+    """Return a name that is known.
+
+    Raises:
+        InvalidParameter: another one; the closest is offered.
+    """
+    if name not in known:
+        close = difflib.get_close_matches(name, known, 1, 0.5)
+        offer = f" Did you mean {close[0]!r}?" if close else ""
+        raise InvalidParameter(f"{what} is {name!r}: expected one of {', '.join(known)}.{offer}")
+    return name
 
 
 @contextlib.contextmanager

@@ -16,8 +16,9 @@ import minari
 from gymnasium import spaces
 from minari.storage.datasets_root_dir import get_dataset_path
 
+from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.dataset_files import check_episode, check_episodes, check_told
-from irl_gym.demonstrations.endings import AfterEnd, checked_after_end, episode_of
+from irl_gym.demonstrations.endings import checked_after_end, episode_of
 from irl_gym.demonstrations.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.demonstrations.minari_formats import DataFormat
 from irl_gym.errors import (

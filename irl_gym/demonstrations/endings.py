@@ -12,10 +12,11 @@ Axes: T steps.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
+from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.minari_formats import ENDING
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UnknownObservation
 from irl_gym.mdp.episodes import Ending, Episode
@@ -23,7 +24,6 @@ from irl_gym.mdp.tabular_mdp import TransitionTable
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
 
-AfterEnd = Literal["refuse", "cut"]
 LOST: dict[str, str] = {
     "dropped": "episodes whose last action was dropped when they were imported, with what it paid",
     "unseen": "episodes that do not say what their last action led to",

@@ -148,6 +148,15 @@ def layers(env: gym.Env) -> Iterator[gym.Env]:
     yield env
 
 
+def shown_by(env: gym.Env) -> dict[str, int]:
+    """What `Reveal` shows around an environment of the state that it hides: name -> number of values."""
+    shown: dict[str, int] = {}
+    for layer in layers(env):
+        if isinstance(layer, Reveal):
+            shown |= {name: n if isinstance(n, int) else len(n) for name, n in layer.shown.items()}
+    return shown
+
+
 _PART = re.compile(r"\.(\w+)|\[(-?\d+(?:, ?-?\d+)*|'[^']*'|\"[^\"]*\")\]")
 """What may follow an attribute's name: `.energy`, `[1]`, `[0, 2]`, `['key']`."""
 

@@ -5,6 +5,7 @@ import importlib
 import inspect
 from typing import Any
 
+from irl_gym.checks import no_module
 from irl_gym.errors import InvalidParameter, UnknownLearner
 from irl_gym.learners.needs import Needs
 
@@ -38,10 +39,7 @@ def learner_class(name: str) -> type[Any]:
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # of something that the user's module imports
-        raise UnknownLearner(
-            f"learner is {name!r}, and there is no module {error.name!r}: expected one that Python finds. Put its folder on "
-            "PYTHONPATH, or install it."
-        ) from error
+        raise UnknownLearner(f"learner is {name!r}, and {no_module(error.name)}") from error
     except AttributeError as error:
         raise UnknownLearner(f"learner is {name!r}, and {module} has no {attribute!r}: expected a class of it.") from error
     usable = isinstance(getattr(found, "needs", None), Needs) and callable(getattr(found, "learn", None))

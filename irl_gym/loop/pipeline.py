@@ -5,9 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-
-from irl_gym.environments.reveal import Reveal
+from irl_gym.environments.reveal import shown_by
 from irl_gym.files.own_files import held
 from irl_gym.loop.loop import Loop
 from irl_gym.loop.stages import OnProgress
@@ -61,20 +59,10 @@ def recover_and_retrain(
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
         found = loop.judged, loop.certificate
         metrics, certificate = _read_again(loop.path, loop.world.table) if stages["report"].get("kept") else found
-    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), _shown(loop.env))
+    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), shown_by(loop.env))
 
 
 def _read_again(path: Path, table: Tabulation | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """The metrics and the certificate of a run that was finished before, which may have been changed since."""
     run = read_run(path, table)
     return run.metrics, run.certificate
-
-
-def _shown(env: gym.Env) -> Mapping[str, int]:
-    """What wrappers show of the state that the environment hides."""
-    shown: dict[str, int] = {}
-    while isinstance(env, gym.Wrapper):
-        if isinstance(env, Reveal):
-            shown |= {name: n if isinstance(n, int) else len(n) for name, n in env.shown.items()}
-        env = env.env
-    return shown

@@ -14,9 +14,10 @@ import numpy as np
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
+from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
-from irl_gym.demonstrations.endings import AfterEnd, left_out
+from irl_gym.demonstrations.endings import left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward
 from irl_gym.features.linear_reward import LinearReward
@@ -87,7 +88,7 @@ def played_episodes(
         recorded, dataset_id, None if lost else env, root=root, algorithm=type(teacher).__name__,
         observation_space=env.observation_space, action_space=env.action_space,
         description=f"{about} {lost}" if lost else about,
-        code_permalink="scripts/recover_and_retrain.py of irl_gym",
+        code_permalink="irl-gym run",
         random_return=float(np.mean([episode.total_reward for episode in chance])),
         expert_return=float(np.mean([episode.total_reward for episode in recorded])),
     )  # fmt: skip

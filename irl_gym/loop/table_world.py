@@ -13,7 +13,8 @@ import numpy as np
 
 from irl_gym.agents.noise import noisy
 from irl_gym.agents.planners import FOR_ADVANTAGES, SB3, Agent, Planner, ValueIteration, tabular_actions
-from irl_gym.demonstrations.endings import AfterEnd, in_table
+from irl_gym.demonstrations.choices import AfterEnd
+from irl_gym.demonstrations.endings import in_table
 from irl_gym.environments.rollouts import run_episodes
 from irl_gym.environments.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.errors import UnknownObservation

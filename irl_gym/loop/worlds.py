@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from irl_gym.agents.noise import Noisy
 from irl_gym.agents.planners import FOR_CONTROL, SB3, Agent, Planner, load_agent
 from irl_gym.agents.simulator import RandomPolicy
-from irl_gym.demonstrations.endings import AfterEnd
+from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.environments.closing import close
 from irl_gym.environments.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.environments.rollouts import maker_of, run_episodes

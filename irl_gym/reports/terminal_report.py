@@ -65,9 +65,7 @@ def _doctor(out: Path, *, kept: bool) -> Iterator[RenderableType]:
         if one["name"] in ABOUT_THE_GIVEN:
             yield Text(harmless(f"Warning: {one['sentence']} {one['mend']}"), "yellow")
     more = (
-        f" This command tells them, with mends: python scripts/doctor.py --run {shlex.quote(str(out))}"
-        if diagnosis["findings"]
-        else ""
+        f" This command tells them, with mends: irl-gym doctor --run {shlex.quote(str(out))}" if diagnosis["findings"] else ""
     )
     who = "The doctor, as recorded when the run was made:" if kept else "The doctor:"
     yield Text(harmless(f"{who} {told_answer(diagnosis)}{more}"), ANSWERS[diagnosis["answer"]])

@@ -14,14 +14,15 @@ import numpy as np
 from irl_gym.agents.noise import checked_epsilon
 from irl_gym.agents.planners import Planner
 from irl_gym.checks import checked_number
-from irl_gym.demonstrations.endings import AfterEnd, checked_after_end
+from irl_gym.demonstrations.choices import AfterEnd
+from irl_gym.demonstrations.endings import checked_after_end
 from irl_gym.errors import InvalidParameter
 from irl_gym.features.feature_maps import FeatureMap
 from irl_gym.learners.base import Learner, checked_learner
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.rewards import plain_json
 from irl_gym.mdp.tabular_mdp import check_discount
-from irl_gym.runs.named_parts import KNOWN, Reveals
+from irl_gym.runs.choices import KNOWN, Reveals
 from irl_gym.tables.tabulate import By
 
 
@@ -127,8 +128,7 @@ class Experiment:
     @property
     def name(self) -> str:
         """A folder's name that no other experiment has: the environment and a digest of everything."""
-        digest = hashlib.sha256(json.dumps(self.to_json(), sort_keys=True).encode()).hexdigest()[:8]
-        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id or self.dataset or '')}-{digest}"
+        return f"{re.sub(r'[^-A-Za-z0-9]+', '-', self.env_id or self.dataset or '')}-{digest_of(self.to_json())}"
 
     def to_json(self) -> dict[str, Any]:
         """The configuration as json; planners, learners and features with their class's name, large arrays by their digest.
@@ -143,6 +143,11 @@ LATER = {"after_end": "refuse", "trust_dataset": False, "features": None}
 """Fields that earlier versions had not, and what these did."""
 MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""
+
+
+def digest_of(config: Mapping[str, Any]) -> str:
+    """8 hexadecimal digits that tell one configuration from another."""
+    return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()[:8]
 
 
 def class_name(value: Any) -> str:

@@ -39,8 +39,8 @@ FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 STAGES = (*FIRST, "record", "ambiguity", "report")
 """All stages after the table."""
 VERSION, ENVIRONMENT = "run.json", "environment.json"
-PROGRAM = ["python", "scripts/recover_and_retrain.py"]
-"""How a run's command begins, unless another program started it."""
+PROGRAM = ["irl-gym", "run"]
+"""How a run's command begins, unless another program started it: this works wherever irl_gym is installed."""
 NEW_FOLDER = "runs/again"
 """The folder of a run that is made again."""
 
@@ -140,18 +140,23 @@ def into_folder(command: Sequence[str], folder: str = NEW_FOLDER) -> list[str]:
     The default makes the run again: in the run's own folder everything is there already, and would be kept. A run that was
     moved or copied is continued where it is now: the folder that the command names may hold another one.
     """
+    return [*without(command, "--out"), "--out", folder]
+
+
+def without(command: Sequence[str], *flags: str) -> list[str]:
+    """The command without some flags that have one value each."""
     kept: list[str] = []
     skipped = False
     for word in map(str, command):
         flag = flag_of(word)
-        if not skipped and flag != "--out":
+        if not skipped and flag not in flags:
             kept.append(word)
-        skipped = flag == "--out" and "=" not in word
-    return [*kept, "--out", folder]
+        skipped = flag in flags and "=" not in word
+    return kept
 
 
 def ours(command: Sequence[str]) -> bool:
-    """Is a command that a file names one of this library's scripts? Any other could be anything, and is said to be."""
+    """Is a command that a file names this library's own? Any other could be anything, and is said to be."""
     return list(map(str, command[:2])) == PROGRAM
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from math import comb, log10
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,15 +16,12 @@ from irl_gym.environments.seeded_starts import SeededStarts
 from irl_gym.errors import InvalidFeatures, NotDiscrete, NotSettable
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.features.feature_maps import FeatureMap, OneHot, Unravel
+from irl_gym.runs.choices import KNOWN, FeatureName, PlannerName, Reveals
 from irl_gym.spaces.coordinates import coordinates_of
 from irl_gym.spaces.integer_spaces import ranges
 from irl_gym.tables.layouts import grid_shape
 from irl_gym.tables.tabulate import make
 
-PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
-FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
-Reveals = Mapping[str, int | Sequence[Any]] | Literal["known"]
-KNOWN: Literal["known"] = "known"
 _ALGORITHMS: dict[str, Algorithm] = {"ppo": "PPO", "dqn": "DQN", "a2c": "A2C"}
 MOST_FEATURES = 256
 """Features that a default size makes at most."""

@@ -17,7 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
-from irl_gym.checks import checked_number, discrete_actions
+from irl_gym.checks import checked_number, discrete_actions, no_module
 from irl_gym.environments.closing import close
 from irl_gym.environments.learned_reward import LearnedReward
 from irl_gym.environments.reveal import layers
@@ -143,10 +143,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
     except (gym.error.Error, ModuleNotFoundError) as error:
         module, _, name = env_id.rpartition(":")
         if module and isinstance(error, ModuleNotFoundError) and f"'{module}'" in str(error):
-            raise UnknownEnvironment(
-                f"environment {env_id!r} is of module {module!r}, which cannot be imported: expected an installed one. Install "
-                "the package that has it."
-            ) from error
+            raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(module)}") from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
             raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
         known = {one.rpartition(":")[2]: one for one in (*gym.registry, *OWN_ENVIRONMENTS)}

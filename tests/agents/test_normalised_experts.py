@@ -20,7 +20,7 @@ from irl_gym.agents.experts import SoftAgent, load_expert, training_of
 from irl_gym.agents.planners import load_agent
 from irl_gym.agents.shown_observations import read_statistics
 from irl_gym.commands.arguments import Arguments, Demonstrations
-from irl_gym.commands.demonstrators import Recording
+from irl_gym.commands.demonstrating.demonstrators import Recording
 from irl_gym.errors import InvalidParameter
 from irl_gym.judging.diagnoses.case import Case
 from irl_gym.judging.diagnoses.truth import blind_expert

@@ -9,7 +9,7 @@ from irl_gym.agents.expert_files import FromFile, check_agent, fingerprint
 from irl_gym.agents.experts import load_expert
 from irl_gym.agents.planners import SB3
 from irl_gym.agents.shown_observations import read_shown, write_shown
-from irl_gym.commands.demonstrators import Recording
+from irl_gym.commands.demonstrating.demonstrators import Recording
 from irl_gym.environments.tabular_vec_env import TabularVecEnv
 from irl_gym.errors import DatasetMismatch, InvalidParameter
 from irl_gym.loop.loop import MAKERS

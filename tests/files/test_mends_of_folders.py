@@ -241,7 +241,7 @@ CASES = [
     ("expected the plan of an export. Delete",
      lambda root: export(damaged_plan(root)), lambda root: told_to_delete(root, told(export, root))),
 ]  # fmt: skip
-FILES = ["run_folder.py", "own_files.py", "archives.py", "export.py", "shards.py"]
+FILES = ["run_folder.py", "own_files.py", "archives.py", "demonstrations/export.py", "shards.py"]
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])

@@ -9,7 +9,7 @@ from gymnasium import spaces
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.commands.arguments import parse_reveal
-from irl_gym.commands.keyboard import controls_of, keys_of_line, keys_typed
+from irl_gym.commands.demonstrating.keyboard import controls_of, keys_of_line, keys_typed
 from irl_gym.demonstrations.datasets import load_minari
 from irl_gym.demonstrations.imports import from_arrays, from_d4rl, from_frame, from_imitation, from_pairs, from_rollouts
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis

@@ -146,7 +146,7 @@ CASES = [
      lambda: Oracle(TabularPolicy(np.eye(3)[MODEL.expert], StateIndex(spaces.Discrete(5))))),
     ("Make its parts with the same.",
      lambda: Problem.of(MODEL.mdp, gamma=MODEL.mdp.gamma / 2), lambda: Problem.of(MODEL.mdp, gamma=MODEL.mdp.gamma)),
-    ("Put its folder on PYTHONPATH, or install it.",
+    ("Run irl-gym in the folder that has it, or install it.",
      lambda: learner_class("nowhere_to_be_found:Dice"), lambda: learner_class("own_learners:Dice")),
     # learners
     ("Give the next observations when they are imported.",

@@ -22,7 +22,7 @@ from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
 
 ASKED = {"env_kwargs": {"is_slippery": False}, "episodes": 5, "eval_episodes": 5, "num_envs": 8}
-COMMAND = ("python", "scripts/recover_and_retrain.py", "--out", "run")
+COMMAND = ("irl-gym", "run", "--out", "run")
 LATE = ("record", "ambiguity", "report")
 TIMED = re.compile(r"agent\.zip|tensorboard/.*|\.stages/.*")
 """Files that hold the time."""

@@ -260,8 +260,7 @@ def test_the_report_counts_what_the_doctor_found(two):
     count = len(read_json(two.out / "diagnosis.json")["findings"])
     assert (
         count > 1
-        and f"The doctor: {count} findings. This command tells them, with mends: python scripts/doctor.py --run {two.out}"
-        in printed(two)
+        and f"The doctor: {count} findings. This command tells them, with mends: irl-gym doctor --run {two.out}" in printed(two)
     )
 
 

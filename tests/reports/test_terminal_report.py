@@ -101,9 +101,7 @@ def test_a_healthy_run_is_called_so(tmp_path):
 
 def test_an_unhealthy_run_names_the_doctor(tmp_path):
     doctored(tmp_path, FOUND)
-    assert f"The doctor: 1 finding. This command tells them, with mends: python scripts/doctor.py --run {tmp_path}" in said(
-        tmp_path
-    )
+    assert f"The doctor: 1 finding. This command tells them, with mends: irl-gym doctor --run {tmp_path}" in said(tmp_path)
 
 
 def test_a_run_that_could_not_be_examined_is_not_called_healthy(tmp_path):

@@ -8,9 +8,9 @@ from reports.page.made_runs import section_of
 
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.agents.simulator import Simulator
-from irl_gym.commands.demonstrators import Recording
-from irl_gym.commands.keyboard import controls_of
-from irl_gym.commands.playing import Play, learn_command, write_played
+from irl_gym.commands.demonstrating.demonstrators import Recording
+from irl_gym.commands.demonstrating.keyboard import controls_of
+from irl_gym.commands.demonstrating.playing import Play, learn_command, write_played
 from irl_gym.demonstrations.datasets import load_minari
 from irl_gym.demonstrations.minari_files import unkept
 from irl_gym.environments.closing import close

@@ -31,6 +31,7 @@ def called(capsys, monkeypatch, unchecked):
     def call(path, *arguments, cwd):
         monkeypatch.chdir(cwd)
         monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        monkeypatch.setattr(sys, "path", [*sys.path])  # where they stand is added
         with pytest.raises(SystemExit) as ended:
             runpy.run_path(str(path), run_name="__main__")
         said = capsys.readouterr()

@@ -1,15 +1,14 @@
 """The script as a person runs it, on runs that went well, badly, and not to their end."""
 
 import re
-import runpy
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from forgetting import without_digests
 
 from irl_gym.agents.planners import ValueIteration
+from irl_gym.commands import doctor as doctor_command
 from irl_gym.judging.diagnoses.doctor import CHECKS
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
@@ -19,8 +18,6 @@ from irl_gym.runs.diagnosed import diagnose_run, diagnose_unfinished
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
 from irl_gym.runs.supply import supplied
-
-SCRIPT = Path(__file__).parents[2] / "scripts" / "doctor.py"
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +85,7 @@ def test_a_run_without_its_page_is_told_apart_and_how_to_write_it(doctor, runs, 
     done = doctor(out)
     assert done.returncode == 1 and done.stdout.startswith("Healthy.") and done.stderr == ""
     told = "The run did not finish: only its page, report.html, is missing. This command writes it: "
-    assert f"{told}python scripts/report.py --run '{out}'" in done.stdout
+    assert f"{told}irl-gym report --run '{out}'" in done.stdout
 
 
 def test_a_run_of_an_earlier_version_without_a_page_did_finish(doctor, runs, tmp_path):
@@ -113,9 +110,8 @@ def test_a_folder_that_may_not_be_read_gets_one_clear_line(monkeypatch, tmp_path
     def refused(path):
         raise PermissionError(13, "Permission denied", str(path))
 
-    script = runpy.run_path(str(SCRIPT))
-    monkeypatch.setitem(script["main"].__globals__, "read_run", refused)
-    assert script["main"](script["Arguments"](tmp_path)) == 2
+    monkeypatch.setattr("irl_gym.runs.run.read_run", refused)
+    assert doctor_command.main(doctor_command.Arguments(tmp_path)) == 2
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path}'\n"
 
 

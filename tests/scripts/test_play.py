@@ -15,6 +15,7 @@ import minari
 import pytest
 from stopped import HANG
 
+from irl_gym.commands.door import main
 from irl_gym.loop import loop
 
 ROOT = Path(__file__).parents[2]
@@ -46,16 +47,14 @@ def test_piped_keys_become_a_dataset_that_minari_opens(tmp_path, monkeypatch):
     assert [bool(one.terminations[-1]) for one in episodes] == [True, True]
 
 
-def test_the_script_says_what_happened_and_how_to_learn_from_it(tmp_path, called, monkeypatch):
+def test_the_script_says_what_happened_and_how_to_learn_from_it(tmp_path, capsys, monkeypatch, unchecked):
     made = piped(WON, *LAKE, "--episodes", "1", cwd=tmp_path)
     assert "Episode 1: return 1 in 6 steps, it ended." in made.stdout and "\x1b" not in made.stdout and made.stderr == ""
-    assert made.stdout.endswith(
-        "    python scripts/recover_and_retrain.py --dataset irl_gym/frozenlake-v1-played-v0 --dataset-root data\n"
-    )
+    assert made.stdout.endswith("    irl-gym run --dataset irl_gym/frozenlake-v1-played-v0 --dataset-root data\n")
     monkeypatch.setitem(loop.MAKERS, "figures", ())  # which take the time
-    _, learns, *arguments = shlex.split(made.stdout.splitlines()[-1])
-    done = called(ROOT / learns, *arguments, "--retrain", "value-iteration", cwd=tmp_path)
-    assert done.returncode == 0 and "The recovered reward" in done.stdout, done.stderr
+    _, *words = shlex.split(made.stdout.splitlines()[-1])
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--retrain", "value-iteration"]) == 0 and "The recovered reward" in capsys.readouterr().out
 
 
 def test_the_end_of_the_input_keeps_what_was_finished(tmp_path, monkeypatch):

@@ -1,7 +1,6 @@
 """The script as a person runs it, by subprocess."""
 
 import json
-import runpy
 import signal
 import subprocess
 import sys
@@ -9,6 +8,9 @@ from pathlib import Path
 
 import pytest
 from stopped import HANG, run_until
+
+from irl_gym.commands import run as run_command
+from irl_gym.commands.arguments import Arguments
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "recover_and_retrain.py"
@@ -54,7 +56,7 @@ def test_the_report_begins_with_what_was_asked(finished):
 
 def test_a_run_keeps_the_arguments_it_was_given(finished):
     (kept,) = (finished[1] / "runs").glob("*/run.json")
-    wanted = ["python", "scripts/recover_and_retrain.py", *QUICK, "--env-kwargs", "is_slippery=false"]
+    wanted = ["irl-gym", "run", *QUICK, "--env-kwargs", "is_slippery=false"]
     assert json.loads(kept.read_text())["command"] == wanted
 
 
@@ -98,7 +100,7 @@ def test_a_mistake_in_a_process_of_its_own_gets_one_clear_line(tmp_path):
 
 def test_help_names_the_learners(tmp_path, called):
     text = called(SCRIPT, "--help", cwd=tmp_path).stdout
-    assert all(name in text for name in ("finite-lp", "feature-lp", "trajectory-lp", "--features", "--dataset", "--bins"))
+    assert all(name in text for name in ("finite-lp", "feature-lp", "trajectory-lp", "--slack", "--dataset", "--bins"))
 
 
 def test_the_report_names_the_best_round_of_trajectories(tmp_path):
@@ -141,9 +143,8 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
     def refused(*_):
         raise PermissionError(13, "Permission denied", str(tmp_path / ".lock"))
 
-    script = runpy.run_path(str(SCRIPT))
-    monkeypatch.setitem(script["main"].__globals__, "recover_and_retrain", refused)
-    assert script["main"](script["Arguments"](out=tmp_path), []) == 2
+    monkeypatch.setattr("irl_gym.loop.pipeline.recover_and_retrain", refused)
+    assert run_command.main(Arguments(out=tmp_path), []) == 2
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'\n"
 
 

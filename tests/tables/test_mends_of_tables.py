@@ -14,7 +14,7 @@ from gymnasium.wrappers import TransformReward
 from mended import GAMMA, done, mends, told, unsaid
 from stable_baselines3.common.env_util import make_vec_env
 
-from irl_gym.commands.keyboard import controls_of
+from irl_gym.commands.demonstrating.keyboard import controls_of
 from irl_gym.demonstrations.imports import from_frame
 from irl_gym.environments.generative import GenerativeModel
 from irl_gym.environments.learned_reward import LearnedReward
@@ -170,7 +170,7 @@ CASES = [
     ("Give LearnedReward the `states` of this table.",
      lambda _: table(LearnedReward(corridor(), np.zeros(10))),
      lambda _: table(LearnedReward(corridor(), np.zeros(7), table(corridor()).states))),
-    ("Install the package that has it.", lambda _: make("no_such_package:Lake-v0"),
+    ("Run irl-gym in the folder that has it, or install it.", lambda _: make("no_such_package:Lake-v0"),
      lambda _: make("irl_gym_envs:irl_gym/GridWorld-v0")),
     ("Wrap it, as in `irl_gym.environments.reveal.Reveal(env)`.", lambda _: table(BLACKJACK),
      lambda _: table(coded(table, BLACKJACK), check_steps=0)),

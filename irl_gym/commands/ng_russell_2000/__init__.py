@@ -2,5 +2,5 @@
 
 Open first: `experiment_1`.
 Each is a frozen record of settings whose `run` gives a frozen outcome: arrays, numbers, and checks against the paper. What the
-paper leaves open is said where it is settled. `scripts/reproduce_ng_russell.py` runs, prints and draws them.
+paper leaves open is said where it is settled. `reproduction` runs, prints and draws them.
 """

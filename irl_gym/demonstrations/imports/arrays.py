@@ -10,8 +10,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.cutting import FLAGS, counts_of, cut, depth, from_lists, from_padded, offsets_at, offsets_of
-from irl_gym.demonstrations.imports.reading import Last, Reading, reading
+from irl_gym.demonstrations.imports.reading import Reading, reading
 from irl_gym.demonstrations.imports.values import as_array, first_part, is_list, numbers
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.mdp.episodes import Episode

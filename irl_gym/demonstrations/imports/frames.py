@@ -19,9 +19,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.cutting import FLAGS, offsets_at
 from irl_gym.demonstrations.imports.files import read_frame
-from irl_gym.demonstrations.imports.reading import Last, reading
+from irl_gym.demonstrations.imports.reading import reading
 from irl_gym.demonstrations.imports.rows import LogColumns
 from irl_gym.demonstrations.imports.values import NO_WORDS, Name, numbers, shown, truths, whole_numbers
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter

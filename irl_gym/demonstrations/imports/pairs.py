@@ -13,7 +13,8 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.checks import is_word
-from irl_gym.demonstrations.imports.reading import Last, Reading, reading
+from irl_gym.demonstrations.choices import Last
+from irl_gym.demonstrations.imports.reading import Reading, reading
 from irl_gym.demonstrations.imports.rows import LogColumns, say_dropped
 from irl_gym.demonstrations.imports.values import truths
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter

@@ -6,15 +6,14 @@ starts where its action space does; an `Episode` counts from 0. An action space 
 """
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import gymnasium as gym
 from gymnasium import spaces
 
 from irl_gym.checks import checked_number, is_word
+from irl_gym.demonstrations.choices import Last
 from irl_gym.errors import InvalidParameter, NotDiscrete
-
-Last = Literal["keep", "drop", "repeat", "row"]
 
 
 @dataclass(frozen=True, eq=False)

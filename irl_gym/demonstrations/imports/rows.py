@@ -25,8 +25,9 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.members import members
-from irl_gym.demonstrations.imports.reading import Last, Reading
+from irl_gym.demonstrations.imports.reading import Reading
 from irl_gym.demonstrations.imports.values import Name, is_list, numbers, truths
 from irl_gym.errors import InvalidDemonstrations
 from irl_gym.mdp.episodes import Ending, Episode

@@ -9,10 +9,11 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.arrays import episodes_of
 from irl_gym.demonstrations.imports.cutting import from_lists
 from irl_gym.demonstrations.imports.files import closest
-from irl_gym.demonstrations.imports.reading import Last, reading
+from irl_gym.demonstrations.imports.reading import reading
 from irl_gym.demonstrations.imports.values import as_array, is_list
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations
 from irl_gym.files.hdf5_files import BROKEN, check_hdf5

@@ -30,7 +30,7 @@ class Finding:
     actions: tuple[int, ...] = ()
     """k actions, one for each of the states, which are repeated where several actions are meant; or none."""
     flags: tuple[str, ...] = ()
-    """What the mend, the first where there are several, is on the command line of scripts/recover_and_retrain.py: flags that go
+    """What the mend, the first where there are several, is on the command line of `irl-gym run`: flags that go
     together, such as "--l1 0"; without a value where that is the reader's to choose, such as "--episodes". Or none."""
 
     def to_json(self) -> dict[str, Any]:

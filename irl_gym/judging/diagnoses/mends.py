@@ -1,6 +1,6 @@
 """Mends that another program makes, with their flags: none asks for the settings that a run has already.
 
-Flags are those of scripts/recover_and_retrain.py. Those of one mend go together on one command line.
+Flags are those of `irl-gym run`. Those of one mend go together on one command line.
 """
 
 import numpy as np

@@ -26,7 +26,7 @@ from irl_gym.spaces.names import action_names, state_name
 from irl_gym.tables.layouts import grid_layout
 from irl_gym.tables.tabulate import tabulate
 
-SCRIPT = ["python", "scripts/recover_and_retrain.py"]
+SCRIPT = ["irl-gym", "run"]
 NO_CURVE = Curve(*np.zeros((5, 0)))
 
 

@@ -209,7 +209,7 @@ def test_a_run_without_a_table_leaves_out_what_needs_one_and_says_so(pages, look
 
 def test_the_command_is_shown_and_copied_or_marked(pages, look):
     page = look(pages["grid"])
-    assert page.locator("#command").inner_text().startswith("python scripts/recover_and_retrain.py")
+    assert page.locator("#command").inner_text().startswith("irl-gym run")
     page.get_by_role("button", name="Copy").click()
     page.until("document.getElementById('copied').textContent")
     assert re.match("Copied|Marked", page.locator("#copied").inner_text())

@@ -7,7 +7,7 @@ from reports.page.made_runs import section_of, table_run, verdict_of
 from irl_gym.reports.page.sections.asked import asked, typed
 from irl_gym.reports.page.sections.proof import doctor, finding
 
-SCRIPT = ("python", "scripts/recover_and_retrain.py")
+SCRIPT = ("irl-gym", "run")
 
 
 def test_only_what_was_typed_is_listed(tmp_path):

@@ -3,7 +3,7 @@
 import pytest
 
 from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
-from irl_gym.reports.page.contents import Contents
+from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.report import write_report
 from irl_gym.reports.page.sections.compared import policies, values
 from irl_gym.runs.run import read_run
@@ -25,7 +25,7 @@ def test_the_page_shows_policy_and_values_of_each_judged_policy_as_maps(policy_r
 
 
 def test_values_of_the_learner_s_policy_are_those_of_the_true_reward(policy_run):
-    scene = Contents(read_run(policy_run("policy"))).scene
+    scene = RunContents(read_run(policy_run("policy"))).scene
     (name, policy), section = *scene.agents.items(), values(scene)
     V, (panel,) = (
         evaluate_policy(scene.mdp, scene.table.reward, policy),
@@ -37,7 +37,7 @@ def test_values_of_the_learner_s_policy_are_those_of_the_true_reward(policy_run)
 
 
 def test_of_a_policy_that_chooses_by_chance_the_likeliest_action_is_judged(policy_run):
-    scene = Contents(read_run(policy_run("policy"))).scene
+    scene = RunContents(read_run(policy_run("policy"))).scene
     n, off = int(scene.acting.sum()), int(scene.deviates(scene.agents["learned"]).sum())
     section = policies(scene)
     assert (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from irl_gym.commands.playing import Turn
-from irl_gym.commands.screens import as_text, half_blocks
+from irl_gym.commands.demonstrating.playing import Turn
+from irl_gym.commands.demonstrating.screens import as_text, half_blocks
 
 
 def test_half_blocks_are_the_picture():

@@ -15,8 +15,8 @@ import numpy as np
 import pygame
 from PIL import Image
 
-from irl_gym.commands.keyboard import keys_of_line, keys_typed
-from irl_gym.commands.playing import Turn
+from irl_gym.commands.demonstrating.keyboard import keys_of_line, keys_typed
+from irl_gym.commands.demonstrating.playing import Turn
 from irl_gym.errors import InvalidParameter
 
 Keys = Generator[str, None, None]

@@ -32,8 +32,9 @@ from irl_gym.mdp.episodes import Episode, collect, collect_from_table
 from irl_gym.mdp.planning.dynamic_programming import value_iteration
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, generator
 from irl_gym.mdp.tabular_mdp import check_discount
+from irl_gym.runs.choices import PlannerName
 from irl_gym.runs.experiment import as_config
-from irl_gym.runs.named_parts import PlannerName, planner_named
+from irl_gym.runs.named_parts import planner_named
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.enumeration.table import Enumeration
 from irl_gym.tables.tabulate import tabulate

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from irl_gym.commands.keyboard import ACTIONS, KEYS, controls_of, described, keys_of_line, keys_typed
+from irl_gym.commands.demonstrating.keyboard import ACTIONS, KEYS, controls_of, described, keys_of_line, keys_typed
 from irl_gym.errors import InvalidParameter, NotDiscrete
 
 MIDDLE = {

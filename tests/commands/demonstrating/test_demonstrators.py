@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from irl_gym.commands import demonstrators
-from irl_gym.commands.demonstrators import NAMED, Drawn, Recording, Stepped
+from irl_gym.commands.demonstrating import demonstrators
+from irl_gym.commands.demonstrating.demonstrators import NAMED, Drawn, Recording, Stepped
 from irl_gym.errors import (
     DatasetMismatch,
     EnumerationLimit,

@@ -11,10 +11,10 @@ from enumeration_envs import Corridor
 from gymnasium import spaces
 from mended import told, unsaid
 
-from irl_gym.commands import screens
 from irl_gym.commands.arguments import Arguments
-from irl_gym.commands.keyboard import controls_of
-from irl_gym.commands.playing import Play, Turn, free_dataset, stage
+from irl_gym.commands.demonstrating import screens
+from irl_gym.commands.demonstrating.keyboard import controls_of
+from irl_gym.commands.demonstrating.playing import Play, Turn, free_dataset, stage
 from irl_gym.commands.terminal import OPTIONS
 
 pytestmark = pytest.mark.usefixtures("unchecked")
@@ -129,8 +129,17 @@ CASES = [
     ("expected name=value, such as map_name=8x8.",
      lambda _: asked("--env-kwargs", "8x8"), lambda _: asked("--env-kwargs", "map_name=8x8").env_kwargs == {"map_name": "8x8"}),
 ]  # fmt: skip
+OF_THE_DOOR = "Name it with --env-id. Leave the others out."  # commands/test_mends_of_the_door.py
 ELSEWHERE = "Learn from it with"  # scripts/test_play.py: test_the_script_says_what_happened_and_how_to_learn_from_it
-FILES = ["playing.py", "screens.py", "keyboard.py", "arguments.py", "doctor.py", "terminal_report.py", "comparison_page.py"]
+FILES = [
+    "playing.py",
+    "screens.py",
+    "keyboard.py",
+    "arguments.py",
+    "diagnoses/doctor.py",
+    "terminal_report.py",
+    "comparison_page.py",
+]
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])
@@ -139,4 +148,4 @@ def test_a_mend_that_an_error_about_a_game_names_serves(tmp_path, says, breaks, 
 
 
 def test_every_mend_that_an_error_about_a_game_names_is_executed():
-    assert not unsaid(CASES, *FILES)
+    assert not unsaid([*CASES, (OF_THE_DOOR,)], *FILES)

@@ -1,7 +1,7 @@
 """A person plays: keys become steps of a rendered environment, and its episodes become demonstrations.
 
 `Play` is the whole game without a screen or a keyboard: `press` takes a key and gives back what is to be seen and said. A front
-end (scripts/play.py: a terminal or a window) reads keys and shows. An episode that was begun again, or not finished, is not a
+end (`irl-gym play`: a terminal or a window) reads keys and shows. An episode that was begun again, or not finished, is not a
 demonstration; each attempt has a seed of its own, so that nobody can rehearse a lucky start.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array
 
 from irl_gym.checks import checked_number
-from irl_gym.commands.keyboard import HELP, QUIT, RESTART, Controls, controls_of, described
+from irl_gym.commands.demonstrating.keyboard import HELP, QUIT, RESTART, Controls, controls_of, described
 from irl_gym.demonstrations.datasets import described as description_of
 from irl_gym.demonstrations.datasets import writable_root, write_minari
 from irl_gym.demonstrations.minari_files import check_free, check_id, unkept
@@ -271,4 +271,4 @@ def learn_command(dataset_id: str, root: str | None, env_id: str | None = None) 
     """The command that learns from a dataset; it names the environment where the dataset does not."""
     where = () if env_id is None else ("--env-id", env_id)
     where += ("--dataset-root", root) if root is not None else ()
-    return shlex.join(["python", "scripts/recover_and_retrain.py", "--dataset", dataset_id, *where])
+    return shlex.join(["irl-gym", "run", "--dataset", dataset_id, *where])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from irl_gym.commands.keyboard import controls_of
-from irl_gym.commands.playing import Play, free_dataset, learn_command, stage, write_played
+from irl_gym.commands.demonstrating.keyboard import controls_of
+from irl_gym.commands.demonstrating.playing import Play, free_dataset, learn_command, stage, write_played
 from irl_gym.errors import DatasetExists, InvalidParameter, NotDiscrete, UnknownEnvironment
 
 LAKE = {"is_slippery": False}
@@ -244,6 +244,4 @@ def test_the_written_dataset_remembers_the_environment(tmp_path, monkeypatch):
 
 
 def test_the_command_to_learn_quotes_what_needs_it():
-    assert learn_command("me/lake-v0", "my data") == (
-        "python scripts/recover_and_retrain.py --dataset me/lake-v0 --dataset-root 'my data'"
-    )
+    assert learn_command("me/lake-v0", "my data") == ("irl-gym run --dataset me/lake-v0 --dataset-root 'my data'")

@@ -1,0 +1,63 @@
+"""The command `irl-gym` in this process, and a folder with a user's own modules."""
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+MODULES = {
+    "own_env_here": """
+import gymnasium as gym
+from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
+
+class Pond(FrozenLakeEnv):
+    def __init__(self, render_mode=None):
+        super().__init__(render_mode, desc=["SF", "HG"])
+
+gym.register("Pond-v0", entry_point="own_env_here:Pond", max_episode_steps=50)
+""",
+    "own_learner_here": """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from irl_gym.learners.linear_programs.finite import FiniteLP
+
+@dataclass(frozen=True)
+class Twin:
+    needs: ClassVar = FiniteLP.needs
+    def learn(self, problem, rng):
+        return FiniteLP().learn(problem, rng)
+""",
+}
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder but for a user's own modules, in which the user stands."""
+    for name, text in MODULES.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(sys, "modules", sys.modules)
+    yield tmp_path
+    for name in MODULES:
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def irl_gym(here, capsys, monkeypatch, unchecked):
+    """The command: what it returns and says. Runs draw no figures, which take the time."""
+    from irl_gym.commands import door  # here, so that the filter of pytest_configure is in force
+    from irl_gym.loop import loop
+
+    monkeypatch.setitem(loop.MAKERS, "figures", ())
+
+    def call(*words):
+        try:
+            code = door.main([*map(str, words)])
+        except SystemExit as ended:
+            code = ended.code or 0
+        said = capsys.readouterr()
+        return SimpleNamespace(code=code, out=said.out, errors=said.err)
+
+    return call

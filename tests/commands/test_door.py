@@ -1,0 +1,138 @@
+"""`irl-gym`: help costs nothing, what is mistyped is offered right, and a user's own modules are found where they stand."""
+
+import importlib.metadata
+import os
+import resource
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from stopped import HANG
+
+from irl_gym.commands import door
+
+ROOT = Path(__file__).parents[2]
+BAR = 0.6
+"""Seconds of processor time that --help may take over a bare interpreter."""
+HEAVY = {"torch", "cvxpy", "minari", "stable_baselines3", "matplotlib", "scipy", "pandas", "pygame"}
+LOADED = """
+import contextlib, sys
+from irl_gym.commands import door
+for name in (*door.SUBCOMMANDS, "no-such-subcommand"):
+    for more in ("--help", "--no-such-option"):
+        with contextlib.suppress(SystemExit):
+            door.main([name, *(["ng-russell-2000"] if name == "reproduce" else []), more])
+print("loaded", *{one.partition(".")[0] for one in sys.modules})
+"""
+FEW = ("--episodes", "5", "--retrain", "value-iteration")
+
+
+def process(*words, cwd=None):
+    return subprocess.run([sys.executable, *words], cwd=cwd, capture_output=True, text=True, timeout=HANG)
+
+
+def seconds(*words):
+    """The least processor time of some starts of Python."""
+    found = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        assert process(*words).returncode == 0
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(found)
+
+
+@pytest.mark.parametrize("words", [("--help",), ("run", "--help"), ("run", "--learner", "feature-lp", "--help")])
+def test_help_costs_little_more_than_a_bare_interpreter(words):
+    over = seconds("-m", "irl_gym", *words) - seconds("-c", "pass")
+    print(f"irl-gym {' '.join(words)}: {over:.2f} s of processor time over a bare interpreter")
+    assert over <= BAR
+
+
+def test_help_and_mistyped_options_load_nothing_heavy():
+    done = process("-c", LOADED)
+    loaded = done.stdout.rpartition("loaded ")[2].split()
+    assert "irl_gym" in loaded and HEAVY & {*loaded} == set() and done.stdout.count("usage: ") == len(door.SUBCOMMANDS)
+
+
+def test_the_console_script_is_the_door():
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    point = importlib.metadata.EntryPoint("irl-gym", scripts["irl-gym"], "console_scripts")
+    assert [*scripts] == ["irl-gym"] and point.load() is door.main
+
+
+def test_help_names_every_subcommand(irl_gym):
+    done = irl_gym("--help")
+    assert done.code == 0 and [name for name in door.SUBCOMMANDS if f"\n  {name} " not in done.out] == []
+    assert irl_gym().out == done.out
+
+
+def test_the_version_is_told(irl_gym):
+    assert irl_gym("--version").out == f"irl-gym {importlib.metadata.version('irl_gym')}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("rnu",), "subcommand is 'rnu': expected one of run, report, compare"),
+        (("rnu",), "Did you mean 'run'?"),
+        (("--env-id", "Taxi-v4"), "expected a subcommand, as in `irl-gym run --env-id FrozenLake-v1`"),
+        (("reproduce", "ng-russell-200"), "Did you mean 'ng-russell-2000'?"),
+        (("run", "--lerner", "feature-lp"), "--learner STR"),
+        (("run", "--env-id", "FrozenLaek-v1"), "The closest are FrozenLake"),
+        (("run", "--learner", "finte-lp"), "Did you mean 'finite-lp'?"),
+        (("doctor", "--rum", "runs/demo"), "--run PATH"),
+    ],
+)
+def test_what_is_mistyped_is_offered_as_it_is_spelled(irl_gym, words, says):
+    done = irl_gym(*words)
+    assert done.code == 2 and says in " ".join(done.errors.split()) and "Traceback" not in done.errors
+
+
+@pytest.mark.parametrize(
+    ("learner", "has", "lacks"),
+    [
+        ("finite-lp", "--slack", "--features"),
+        ("feature-lp", "--sample", "--rounds"),
+        ("trajectory-lp", "--rounds", "--margin-cap"),
+        ("my_module:MyLearner", "--options", "--l1"),
+    ],
+)
+def test_help_shows_the_options_of_the_learner_that_is_named_and_no_others(irl_gym, learner, has, lacks):
+    for words in (("--learner", learner), (f"--learner={learner}",)):
+        said = irl_gym("run", *words, "--help").out
+        assert f"{has} " in said and f"{lacks} " not in said and "--retrain " in said
+
+
+def test_the_users_own_modules_are_found_where_the_user_stands(here):
+    where = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "envs")])}
+    words = ["run", "--env-id", "own_env_here:Pond-v0", "--learner", "own_learner_here:Twin", *FEW, "--out", "run"]
+    start = "import sys; sys.path[0] = '/nowhere'; from irl_gym.commands.door import main; sys.exit(main())"
+    done = subprocess.run([sys.executable, "-c", start, *words], capture_output=True, text=True, timeout=HANG, env=where)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("own_env_here:Pond-v0; gamma 0.99; seed 0.") and (here / "run/report.html").exists()
+
+
+def test_the_module_ends_as_the_command_does(tmp_path):
+    done = process("-m", "irl_gym", "run", "--env-id", "FrozenLake-v1", *FEW, cwd=tmp_path)
+    assert done.returncode == 0 and "Under the true reward" in done.stdout and done.stderr == ""
+    assert process("-m", "irl_gym", "report", "--run", "nowhere", cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize("what", ["env-id", "learner"])
+def test_a_module_that_is_missing_is_told_with_where_it_was_looked_for(irl_gym, here, what):
+    done = irl_gym("run", f"--{what}", "nowhere_to_be_found:Mine-v0")
+    assert done.code == 2 and done.errors.count("\n") == 1 and "and there is no module 'nowhere_to_be_found'" in done.errors
+    assert f"looked for in {here} and among what is installed: expected one that Python finds. Run irl-gym in" in done.errors
+
+
+def test_an_installed_module_comes_before_one_of_that_name_where_the_user_stands(irl_gym, here):
+    (here / "queue.py").write_text("raise RuntimeError")
+    assert irl_gym("learners").code == 0 and sys.path[-1] == str(here)
+
+
+def test_python_that_is_asked_to_trust_no_folder_trusts_none(here):
+    told = process("-P", "-m", "irl_gym", "run", "--learner", "own_learner_here:Twin", cwd=here).stderr
+    assert "no module 'own_learner_here', which was looked for among what is installed" in told

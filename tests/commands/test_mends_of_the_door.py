@@ -1,0 +1,32 @@
+"""The mends that `irl-gym` names where it reads its arguments are executed."""
+
+import pytest
+
+LOG = "episode,step,cell,action\na,0,0,1\na,1,2,2\n"
+POND = ("--env-id", "FrozenLake-v1", "--env-kwargs", 'desc=["SF","FG"]', "is_slippery=false")
+CSV = ("--csv", "log.csv", "--observation-columns", "cell", "--retrain", "value-iteration")
+CASES = [
+    ("expected a subcommand, as in `irl-gym run --env-id FrozenLake-v1`.", ("--env-id", "FrozenLake-v1"),
+     ("learners", "--markdown")),
+    ("Name it with --env-id.", ("run", *CSV), ("run", *POND, *CSV)),
+    ("Leave the others out.", ("run", *POND, *CSV, "--epsilon", "0.1"), ("run", *POND, *CSV)),
+    ("Leave the others out.", ("export", *POND, *CSV[:4], "--dataset-id", "me/log-v0", "--root", ".", "--seed", "3"),
+     ("export", *POND, *CSV[:4], "--dataset-id", "me/log-v0", "--root", ".")),
+    ("--observation-columns, --action-column", ("run", *POND, *CSV[:2]), ("run", *POND, *CSV)),
+    ("Leave the other out.", ("run", "--seed", "1", "--seeds", "0,1"), ("learners",)),
+    ("Run irl-gym in the folder that has it, or install it.", ("learners", "nowhere_to_be_found:Twin"),
+     ("learners", "own_learner_here:Twin")),
+    ("Did you mean 'doctor'?", ("doktor",), ("doctor", "--help")),
+    ("Choose another --out.", ("run", *POND, *CSV, "--out", "taken"), ("run", *POND, *CSV, "--out", "other")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[f"{one[1][0]}: {one[0]}" for one in CASES])
+def test_a_mend_that_the_command_line_names_serves(irl_gym, here, says, breaks, mended):
+    (here / "log.csv").write_text(LOG)
+    (here / "taken").mkdir()
+    (here / "taken/notes.txt").write_text("mine")
+    done = irl_gym(*breaks)
+    assert done.code == 2 and says in done.errors
+    done = irl_gym(*mended)
+    assert done.code == 0, done.errors

@@ -87,7 +87,7 @@ def main(arguments: Arguments) -> int:
         about = described(
             arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
         )
-        with stage_bars(console) as show:
+        with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the rest is piped
             dataset = export_dataset(
                 lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
                 about, amount, recording.plan(env), root=arguments.root, on_progress=show,

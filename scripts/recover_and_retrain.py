@@ -10,6 +10,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from irl_gym.commands.started import say_started
+
+if __name__ == "__main__":
+    say_started(sys.argv)  # what is imported below takes seconds
+
 import tyro
 from rich.console import Console
 
@@ -29,7 +34,9 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
             report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show, command)
         print_report(report, console)
     except KeyboardInterrupt:
-        Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
+        Console(stderr=True).print(
+            "Stopped. The same command continues after the last finished stage, and inside the training of an agent."
+        )
         return 130
     except (IrlGymError, OSError) as error:
         print_error(error)

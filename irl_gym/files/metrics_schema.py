@@ -187,7 +187,10 @@ class Demonstrated(Lost):
     vecnormalize: NotRequired[bool]
 
 
-Training = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Count | None, "steps_to_0.99": Count | None})
+Training = TypedDict("Training", {
+    "environment_steps": Count, "resumed_at": NotRequired[list[Count]],
+    "steps_to_0.9": Count | None, "steps_to_0.99": Count | None,
+})  # fmt: skip
 
 
 class Metrics(TypedDict):

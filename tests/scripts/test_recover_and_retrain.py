@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from stopped import HANG, run_until
 
+from irl_gym.runs.identity import STAGES
+
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "recover_and_retrain.py"
 QUICK = ("--total-timesteps", "4096", "--episodes", "10")
@@ -38,8 +40,12 @@ def test_the_report_names(finished, word):
     assert word in finished[0].stdout
 
 
-def test_the_script_is_quiet_when_not_on_a_terminal(finished):
-    assert finished[0].stderr == "" and "\x1b" not in finished[0].stdout
+def test_each_stage_has_plain_lines_where_there_is_no_terminal(finished):
+    said = finished[0].stderr.splitlines()
+    assert said[0] == "irl_gym: loading" and "\x1b" not in finished[0].stderr + finished[0].stdout
+    stages = [name for name in ("table", *STAGES) for _ in range(2)]
+    assert [line.split(":")[0] for line in said[1:] if "%" not in line] == stages
+    assert any(line.startswith("agent: done in ") and "mean return " in line for line in said)
 
 
 def test_the_last_line_names_the_page(finished):
@@ -148,11 +154,13 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
 
 
 AGENT = "irl_gym.agents.planners:SB3.plan"
+CHECKPOINT = "irl_gym.loop.learning_curve:Glances.arrays"
+LONGER = ("--total-timesteps", "16384", "--episodes", "10")
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
     made = run_until(SCRIPT, "--out", "run", "--episodes", "10", where=AGENT, sent=signal.SIGINT, cwd=tmp_path)
-    assert made.returncode == 130 and made.stderr.startswith("Stopped. The same command continues")
+    assert made.returncode == 130 and made.stderr.splitlines()[-1].startswith("Stopped. The same command continues")
 
 
 def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
@@ -164,3 +172,23 @@ def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path
     made = run(*arguments, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept
+
+
+def test_the_first_line_is_there_before_anything_heavy_is_imported(tmp_path):
+    code = "import sys; from irl_gym.commands.started import say_started; say_started([]); print(*sys.modules)"
+    made = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=HANG)
+    assert made.stderr == "irl_gym: loading\n" and not {"numpy", "torch", "rich", "gymnasium"} & set(made.stdout.split())
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_an_agent_that_was_stopped_in_its_training_goes_on_and_ends_in_the_same_bytes(finished, tmp_path, sent):
+    arguments = (*LONGER, "--env-kwargs", "is_slippery=false")
+    made = run_until(SCRIPT, *arguments, "--out", "run", where=CHECKPOINT, nth=2, sent=sent, cwd=tmp_path)
+    assert made.returncode == (130 if sent == signal.SIGINT else -sent), made.stderr
+    assert (tmp_path / "run" / ".agent.tmp.npz").exists() and not (tmp_path / "run" / "agent.zip").exists()
+    made = run(*arguments, "--out", "run", cwd=tmp_path)
+    assert made.returncode == 0 and "went on at step 6,144" in made.stderr, made.stderr
+    assert not (tmp_path / "run" / ".agent.tmp.npz").exists()
+    assert run(*arguments, "--out", "once", cwd=tmp_path).returncode == 0
+    for name in ("agent_policy.npz", "learning_curve.csv", "metrics.json"):
+        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "once" / name).read_bytes(), name

@@ -36,6 +36,7 @@ from irl_gym.runs.scorecard import (
     settled,
     shown_told,
     table_told,
+    training_told,
 )
 from irl_gym.tables.tabulation import Tabulation
 
@@ -107,8 +108,7 @@ def claims(
         yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
-    taken = {key: one for key, one in stages["agent"].items() if key == "environment_steps"}
-    yield Claim(".stages/agent.json", {"training": taken})
+    yield Claim(".stages/agent.json", {"training": training_told(stages["agent"])})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
         told = table_told(table, metrics["table"].get("horizon") if known["given"] else None)

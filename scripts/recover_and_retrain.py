@@ -34,7 +34,7 @@ def main(arguments: Arguments, command: Sequence[str]) -> int:
             report = recover_and_retrain(asked, arguments.out or Path("runs") / asked.name, show, command)
         print_report(report, console)
     except KeyboardInterrupt:
-        Console(stderr=True).print(
+        Console(stderr=True, soft_wrap=True).print(
             "Stopped. The same command continues after the last finished stage, and inside the training of an agent."
         )
         return 130

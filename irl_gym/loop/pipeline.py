@@ -38,7 +38,7 @@ def recover_and_retrain(
         report.html                                   all of it, on a page
     The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
     that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage, and
-    inside the training of an agent, of which at most a twentieth is repeated, or what is left of a rollout. On a table that
+    inside the training of an agent, of which at most a twentieth and one rollout are repeated. On a table that
     leaves the same bytes too; where the environment is stepped its episodes begin anew, and the run says at which step.
     .stages/ has the sha256 of every file that is read again: one that is another is named, and nothing is made from it.
 

@@ -155,7 +155,7 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
 
 AGENT = "irl_gym.agents.planners:SB3.plan"
 CHECKPOINT = "irl_gym.loop.learning_curve:Glances.arrays"
-LONGER = ("--total-timesteps", "16384", "--episodes", "10")
+LONGER = ("--total-timesteps", "12288", "--episodes", "10", "--env-kwargs", "is_slippery=false")
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
@@ -180,15 +180,20 @@ def test_the_first_line_is_there_before_anything_heavy_is_imported(tmp_path):
     assert made.stderr == "irl_gym: loading\n" and not {"numpy", "torch", "rich", "gymnasium"} & set(made.stdout.split())
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_an_agent_that_was_stopped_in_its_training_goes_on_and_ends_in_the_same_bytes(finished, tmp_path, sent):
-    arguments = (*LONGER, "--env-kwargs", "is_slippery=false")
-    made = run_until(SCRIPT, *arguments, "--out", "run", where=CHECKPOINT, nth=2, sent=sent, cwd=tmp_path)
+@pytest.fixture(scope="module")
+def in_one_go(tmp_path_factory):
+    cwd = tmp_path_factory.mktemp("once")
+    assert run(*LONGER, "--out", "once", cwd=cwd).returncode == 0
+    return cwd / "once"
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
+def test_an_agent_that_was_stopped_in_its_training_goes_on_and_ends_in_the_same_bytes(in_one_go, tmp_path, sent):
+    made = run_until(SCRIPT, *LONGER, "--out", "run", where=CHECKPOINT, nth=4, sent=sent, cwd=tmp_path)
     assert made.returncode == (130 if sent == signal.SIGINT else -sent), made.stderr
     assert (tmp_path / "run" / ".agent.tmp.npz").exists() and not (tmp_path / "run" / "agent.zip").exists()
-    made = run(*arguments, "--out", "run", cwd=tmp_path)
+    made = run(*LONGER, "--out", "run", cwd=tmp_path)
     assert made.returncode == 0 and "went on at step 6,144" in made.stderr, made.stderr
     assert not (tmp_path / "run" / ".agent.tmp.npz").exists()
-    assert run(*arguments, "--out", "once", cwd=tmp_path).returncode == 0
     for name in ("agent_policy.npz", "learning_curve.csv", "metrics.json"):
-        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "once" / name).read_bytes(), name
+        assert (tmp_path / "run" / name).read_bytes() == (in_one_go / name).read_bytes(), name

@@ -65,12 +65,19 @@ def train(world, paid, total, checkpoint=None, see=None):
     return world.train(SimpleNamespace(plan=partial(plan, checkpoint=checkpoint)), paid, see)
 
 
+class Silent(Glances):
+    """The learning curve alone."""
+
+    def _return_of(self, glanced):
+        return ""
+
+
 def seconds(world, paid, total, told):
     """Processor time of a training, with progress and checkpoints or without."""
     with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as nowhere:
         start = time.process_time()
         if not told:
-            train(world, paid, total, see=lambda steps, policy: world.glance(policy))
+            train(world, paid, total, see=Silent(world, lambda steps, earned: None).see)
             return time.process_time() - start
         with stage_bars(Console(file=nowhere, force_terminal=True, width=120)) as show:
             glances = Glances(world, lambda steps, earned: show("agent", steps / total, earned))
@@ -124,7 +131,10 @@ def main(asked):
         for told, found in times.items():
             found.append(seconds(world, paid, asked.total_timesteps, told))
     plain, told = (float(np.median(times[one])) for one in (False, True))
-    print(f"training: {plain:.2f} s of processor time, {told:.2f} s with progress and checkpoints: {told / plain - 1:+.1%}")
+    print(
+        f"training: {plain:.2f} s of processor time, {told:.2f} s with progress and checkpoints: {told / plain - 1:+.1%}",
+        flush=True,
+    )
     with tempfile.TemporaryDirectory() as folder:
         first = [until_first_words(Path(folder) / str(i)) for i in range(asked.rounds)]
         print(f"first words: after {np.median(first):.2f} s, {max(first):.2f} s at most, of {asked.rounds} starts")

@@ -11,6 +11,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -112,7 +113,7 @@ class Checkpoint:
                 "Delete it, and its stage is run again."
             ) from error
 
-    @property
+    @cached_property
     def _identity(self) -> Any:
         return json.loads(json.dumps({"of": self.of, "by": {name: importlib.metadata.version(name) for name in WHO}}))
 
@@ -244,7 +245,8 @@ def _of_optimizer(kept: Mapping[str, np.ndarray]) -> dict[int, dict[str, torch.T
 
 def _generators(model: Any) -> dict[str, Any]:
     """The states of what a model and its exploration are drawn from."""
-    kind, keys, *rest = np.random.get_state()  # noqa: NPY002 (SB3 draws from it)
+    drawn: Any = np.random.get_state()  # noqa: NPY002 (SB3 draws from it)
+    kind, keys, *rest = drawn
     actions = model.action_space.np_random.bit_generator.state
     return {"torch": torch.get_rng_state().tolist(), "numpy": [kind, keys.tolist(), *rest], "actions": actions}
 

@@ -13,7 +13,7 @@ from irl_gym.judging.curves import Curve, curve_of
 from irl_gym.loop.worlds import World
 from irl_gym.mdp.policies import Policy
 
-SELDOM = 100
+SELDOM = 200
 """Times as long as it takes to draw the episodes of one point, before they are drawn again only to be told of."""
 
 

@@ -40,7 +40,7 @@ def opened(monkeypatch):
 def test_plain_minari_opens_what_the_script_wrote(tmp_path, opened, kind, run):
     made = run(*LAKE, "--episodes", "30", "--format", kind, "--epsilon", "0.1", "--root", str(tmp_path))
     assert made.returncode == 0 and f"{ID}: 30 episodes" in made.stdout
-    assert "\x1b" not in made.stderr and made.stderr.splitlines()[-1].startswith("episodes: done in ")
+    assert "\x1b" not in made.stderr and made.stderr.splitlines()[-1].startswith("writing: done in ")
     dataset = opened(tmp_path)
     assert sum(1 for _ in dataset.iterate_episodes()) == 30 and len(dataset.sample_episodes(4)) == 4
     assert dataset.recover_environment().spec.kwargs == {"map_name": "8x8"}

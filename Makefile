@@ -35,6 +35,7 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python -m pytest -m slow tests/fuzz -s
 	$(BIN)/python -m pytest -m 'hypothesis and not slow' --hypothesis-profile thorough
 	$(BIN)/python scripts/measure_speed.py
+	$(BIN)/python scripts/measure_progress.py
 	$(BIN)/python scripts/measure_retraining.py
 	$(BIN)/python scripts/measure_learners.py
 	$(BIN)/python scripts/measure_metrics.py

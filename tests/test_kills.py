@@ -56,7 +56,7 @@ for line in sys.stdin:
     child = os.fork() or forked(*json.loads(line))
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
-RUN = ("recover_and_retrain.py", "--out", ("--env-kwargs", "is_slippery=false", "--episodes", "5", "--total-timesteps", "2048"))
+RUN = ("recover_and_retrain.py", "--out", ("--env-kwargs", "is_slippery=false", "--episodes", "5", "--total-timesteps", "6144"))
 EXPORT = ("export_dataset.py", "--root", ("--env-id", "FrozenLake-v1", "--dataset-id", "lake/best-v0", "--episodes", "40"))
 OFTEN = {"irl_gym.demonstrations.export:SHARD_BYTES": 3_000}
 TIMED = re.compile(r"(.*/)?(agent\.zip|tensorboard/.*|\.stages/.*)")

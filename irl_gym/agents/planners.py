@@ -21,11 +21,11 @@ import torch
 from gymnasium import spaces
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import HumanOutputFormat, Logger, configure
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym._typing import Actions
+from irl_gym.agents.checkpoints import Checkpoint, Watching
 from irl_gym.agents.shown_observations import Normaliser, read_shown, write_shown
 from irl_gym.checks import checked_number
 from irl_gym.environments.tabular_vec_env import TabularVecEnv
@@ -211,6 +211,7 @@ class SB3:
         progress: Progress | None = None,
         interval: int = 0,
         log: Path | None = None,
+        checkpoint: Checkpoint | None = None,
     ) -> Agent:
         """Train a new agent.
 
@@ -221,17 +222,20 @@ class SB3:
             progress: called about every `interval` environment steps, and at the end.
             interval: environment steps between calls; 0 for a hundredth of the total.
             log: folder for SB3's own scalars, as TensorBoard reads them; None for no log.
+            checkpoint: where the training is kept while it is under way, and gone on with; None for nowhere.
         """
         settings = self._settings(env)
         with _torch_threads(self.threads):
             model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
             agent = Agent(model, env.states if isinstance(env, TabularVecEnv) and env.shows_rows else None)
-            callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
+            watching = Watching(agent, self.total_timesteps, progress, interval or self.total_timesteps // 100, checkpoint)
             if log is not None:
                 model.set_logger(configure(str(log), ["tensorboard"]))
             elif model.tensorboard_log is None:  # SB3's own logger leaves a folder in the temporary one
                 model.set_logger(Logger(None, [HumanOutputFormat(sys.stdout)] if model.verbose else []))
-            model.learn(self.total_timesteps, callback=callback)
+            going_on = watching.resume()
+            left = self.total_timesteps - model.num_timesteps  # none where it was killed after the last step
+            model.learn(left, callback=watching, reset_num_timesteps=not going_on)
             model.logger.close()
         if progress:
             progress(model.num_timesteps, agent)
@@ -270,18 +274,6 @@ FOR_CONTROL = SB3(
 def _batch_size(rollout: int) -> int:
     """Half a rollout or less, about 1024, without a rest; all of it where it has no such divisor."""
     return max((d for d in range(256, min(rollout, 1024) + 1) if rollout % d == 0), default=rollout)
-
-
-class _Report(BaseCallback):
-    def __init__(self, agent: Agent, progress: Progress, interval: int):
-        super().__init__()
-        self._agent, self._progress, self._interval, self._next = agent, progress, interval, 0
-
-    def _on_step(self) -> bool:
-        if self.num_timesteps >= self._next:
-            self._next = self.num_timesteps + self._interval
-            self._progress(self.num_timesteps, self._agent)
-        return True
 
 
 @contextlib.contextmanager

@@ -93,7 +93,7 @@ def main(arguments: Arguments) -> int:
     """Export, and say what there is."""
     console = Console(soft_wrap=True)
     try:
-        dataset, lost = exported(arguments, console)
+        dataset, lost = exported(arguments)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. The same command continues after the last episodes written.")
         return 130
@@ -110,7 +110,7 @@ def main(arguments: Arguments) -> int:
     return 0
 
 
-def exported(arguments: Arguments, console: Console) -> tuple[Any, str | None]:
+def exported(arguments: Arguments) -> tuple[Any, str | None]:
     """The dataset, of an expert's episodes or of a file's; and what it cannot say of where they were recorded.
 
     Raises:
@@ -142,7 +142,7 @@ def exported(arguments: Arguments, console: Console) -> tuple[Any, str | None]:
     about = described(
         arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
     )
-    with stage_bars(console) as show:
+    with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the rest is piped
         dataset = export_dataset(
             lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
             about, amount, recording.plan(env), root=arguments.root, on_progress=show,

@@ -102,10 +102,12 @@ def _told(arguments: Arguments, command: Sequence[str], shared: Path, *, quiet: 
     console = Console(soft_wrap=True) if quiet else Console()
     try:
         with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the report is piped
+            show("loading", None)  # what is imported next takes seconds
             from irl_gym.judging.shares import judgements
             from irl_gym.loop.pipeline import recover_and_retrain
             from irl_gym.reports.terminal_report import print_report
 
+            show("loading", 1.0)
             asked, out = _kept(arguments, shared)
             report = recover_and_retrain(asked, out, show, command)
         if quiet:
@@ -114,7 +116,9 @@ def _told(arguments: Arguments, command: Sequence[str], shared: Path, *, quiet: 
         else:
             print_report(report, console)
     except KeyboardInterrupt:
-        Console(stderr=True).print("Stopped. The same command continues after the last finished stage.")
+        Console(stderr=True, soft_wrap=True).print(
+            "Stopped. The same command continues after the last finished stage, and inside the training of an agent."
+        )
         return STOPPED
     except (IrlGymError, OSError) as error:
         print_error(error)

@@ -49,7 +49,8 @@ def main(arguments: Arguments) -> int:
     try:
         check_writable(arguments.out)
         with stage_bars(Console(stderr=True)) as show:
-            lines = tabulated(arguments, lambda share: show("table", share))
+            lines = tabulated(arguments, lambda share, told: show("table", share, told))
+            show("table", 1.0)
     except KeyboardInterrupt:
         Console(stderr=True).print("Stopped. Nothing was written.")
         return 130
@@ -62,21 +63,22 @@ def main(arguments: Arguments) -> int:
     return 0
 
 
-def tabulated(arguments: Arguments, tell: Callable[[float], None]) -> list[str]:
+def tabulated(arguments: Arguments, tell: Callable[[float | None, str], None]) -> list[str]:
     """Make the table and keep it; what is said of it.
 
     Args:
         arguments: what is asked for.
-        tell: told the share that is done.
+        tell: told the share that is done, None where that cannot be known, and what is known of it.
 
     Raises:
         IrlGymError: no such environment, or no table of it.
     """
     from irl_gym.errors import HiddenState
-    from irl_gym.loop.world_choice import ON_COMMAND_LINE
+    from irl_gym.loop.world_choice import ON_COMMAND_LINE, telling
     from irl_gym.runs.experiment import parse_keywords
     from irl_gym.runs.named_parts import environment_of
     from irl_gym.tables.discretize import discretize
+    from irl_gym.tables.enumeration.table import Enumeration
     from irl_gym.tables.table_files import save_table
     from irl_gym.tables.tabulate import tabulate
 
@@ -89,11 +91,10 @@ def tabulated(arguments: Arguments, tell: Callable[[float], None]) -> list[str]:
     try:
         if (cells := asked.cells) is not None:
             method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
-            table = discretize(env, gamma=given.gamma, bins=cells, seed=arguments.seed, on_progress=tell, **method)
+            method["on_progress"] = lambda share: tell(share, "")
+            table = discretize(env, gamma=given.gamma, bins=cells, seed=arguments.seed, **method)
         else:
-            table = tabulate(
-                env, gamma=given.gamma, by=by, seed=arguments.seed, progress=lambda done, of: tell(done / max(of, 1))
-            )
+            table = tabulate(env, gamma=given.gamma, by=by, seed=arguments.seed, progress=telling(by or Enumeration(), tell))
     except HiddenState as error:
         raise HiddenState(f"{error} {ON_COMMAND_LINE[HiddenState]}") from error
     save_table(table, arguments.out)

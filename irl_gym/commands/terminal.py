@@ -2,10 +2,12 @@
 
 import contextlib
 import difflib
+import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import tyro
 from rich.console import Console
@@ -49,19 +51,99 @@ def checked_name(what: str, name: str, known: Collection[str]) -> str:
     return name
 
 
+QUIET = 10.0
+"""Seconds between two lines on one stage, where there is no terminal."""
+PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
+"""How Rich prints a text as it is."""
+REFRESHED = 2
+"""Times a second that bars are drawn: each takes a few milliseconds of the processor."""
+
+
+@runtime_checkable
+class Show(Protocol):
+    """What is to be told how far a stage is."""
+
+    def __call__(self, stage: str, share: float | None, told: str = "") -> None:
+        """Show a stage.
+
+        Args:
+            stage: its name.
+            share: of it that is done, 1 at its end; None where that cannot be known.
+            told: what else is known, such as an agent's mean return.
+        """
+
+
+@dataclass
+class _Stage:
+    """What was told of a stage that has begun."""
+
+    began: float
+    first: tuple[float, float] | None = None
+    """When a share above 0 was first told, and which: a training that goes on does not begin at 0."""
+    share: float | None = 0.0
+    said: float = 0.0
+    done: bool = False
+    told: str = ""
+
+    def see(self, now: float, share: float | None, told: str) -> None:
+        self.share, self.done, self.told = share, share == 1.0, told or self.told
+        if self.first is None and share:
+            self.first = (now, share)
+
+    @property
+    def percent(self) -> str:
+        """The share that is done; nothing where that is not known."""
+        return f"{self.share:.0%}".replace("%", " %") if self.share else ""
+
+    def left(self, now: float) -> str:
+        """How long it will take, if it goes on as it did; nothing where that is not known."""
+        if self.first is None or self.share is None or not self.first[1] < self.share < 1:
+            return ""
+        pace = (now - self.first[0]) / (self.share - self.first[1])
+        return f"about {_duration(pace * (1 - self.share))} left"
+
+
+def _listed(*words: str) -> str:
+    return ", ".join(filter(None, words))
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
 @contextlib.contextmanager
-def stage_bars(console: Console) -> Iterator[Callable[[str, float], None]]:
-    """A bar for each stage, on a terminal only; gives what is to be told a stage and the share of it that is done."""
+def stage_bars(console: Console) -> Iterator[Show]:
+    """How far each stage is: a bar on a terminal, elsewhere plain lines, at its begin and end and rarely in between."""
+    live = console.is_terminal and not console.is_dumb_terminal
     bars = Progress(
-        TextColumn("{task.description:14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
-        console=console, disable=not console.is_terminal,
+        TextColumn("{task.description:14}"), BarColumn(20), TextColumn("{task.fields[percent]:>5}"), TimeElapsedColumn(),
+        TextColumn("{task.fields[told]}", markup=False),
+        console=console, disable=not live, refresh_per_second=REFRESHED,
     )  # fmt: skip
+    stages: dict[str, _Stage] = {}
     tasks: dict[str, Any] = {}
 
-    def show(stage: str, share: float) -> None:
-        if stage not in tasks:
-            tasks[stage] = bars.add_task(stage, total=1.0)
-        bars.update(tasks[stage], completed=share)
+    def draw(stage: str, known: _Stage, now: float, *, begins: bool) -> None:
+        if begins:
+            tasks[stage] = bars.add_task(stage, total=None, percent="", told="")
+        said, total = _listed(known.left(now), known.told), 1.0 if known.share else None  # a bar without a total moves
+        bars.update(tasks[stage], total=total, completed=known.share or 0.0, percent=known.percent, told=said)
+
+    def write(stage: str, known: _Stage, now: float, *, begins: bool) -> None:
+        if not (begins or known.done or now >= known.said + QUIET):
+            return
+        known.said, taken = now, _duration(now - known.began)
+        words = (f"done in {taken}",) if known.done else ("begun",) if begins else (known.percent, taken, known.left(now))
+        console.print(f"{stage}: {_listed(*words, known.told)}", **PLAIN)
+
+    def show(stage: str, share: float | None, told: str = "") -> None:
+        begins, now = stage not in stages, time.monotonic()
+        known = stages.setdefault(stage, _Stage(now))
+        if not known.done:  # what is asked again of a stage that is finished is no news
+            known.see(now, share, told)
+            (draw if live else write)(stage, known, now, begins=begins)
 
     with bars:
         yield show

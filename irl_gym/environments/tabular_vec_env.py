@@ -5,8 +5,9 @@ infos (`terminal_observation`, `TimeLimit.truncated`, Monitor's `episode`), the 
 Axes: N copies, S states, A actions.
 """
 
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -100,6 +101,16 @@ class TabularVecEnv(VecEnv):
         self._begin()
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return self._observe(self._rows)
+
+    def moment(self) -> dict[str, np.ndarray]:
+        """Where all copies stand, and the state of the generator: all that what follows depends on but the actions."""
+        drawn = np.array(json.dumps(self._rng.bit_generator.state))
+        return {"rows": self._rows, "elapsed": self._elapsed, "returns": self._returns, "generator": drawn}
+
+    def go_on(self, moment: Mapping[str, np.ndarray]) -> None:
+        """Set all copies to a `moment` of theirs."""
+        self._rows, self._elapsed, self._returns = (moment[name].copy() for name in ("rows", "elapsed", "returns"))
+        self._rng.bit_generator.state = json.loads(str(moment["generator"]))
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions (N,) of the next step.

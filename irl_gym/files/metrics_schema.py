@@ -197,7 +197,10 @@ class Demonstrated(Lost):
     vecnormalize: NotRequired[bool]
 
 
-TrainingEntry = TypedDict("Training", {"environment_steps": Count, "steps_to_0.9": Count | None, "steps_to_0.99": Count | None})
+TrainingEntry = TypedDict("Training", {
+    "environment_steps": Count, "resumed_at": NotRequired[list[Count]],
+    "steps_to_0.9": Count | None, "steps_to_0.99": Count | None,
+})  # fmt: skip
 
 
 class Metrics(TypedDict):

@@ -138,6 +138,7 @@ class Stage(Timed):
     """Of any stage."""
 
     environment_steps: NotRequired[Count]
+    resumed_at: NotRequired[list[Count]]
 
 
 class Lost(TypedDict, total=False):
@@ -201,6 +202,7 @@ class Retrained(Timed):
 
     planner: NotRequired[Text]
     environment_steps: NotRequired[Count]
+    resumed_at: NotRequired[list[Count]]
 
 
 class Open(Stage):

@@ -4,7 +4,8 @@ On a table only the agent's actions are kept while it trains, and the episodes o
 stepping thousands of episodes at once takes a hundredth of the time of stepping a hundred, point by point.
 """
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -12,25 +13,28 @@ from irl_gym.judging.curves import Curve, curve_of
 from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.policies import Policy
 
+SELDOM = 200
+"""Times as long as it takes to draw the episodes of one point, before they are drawn again only to be told of."""
+
 
 class Glances:
     """What the agent was worth at each point, under the true reward, which judges it and does not steer.
 
     Args:
         world: where it trains.
-        told: called with the steps and the policy too.
+        told: called with the steps made so far and what is known of the agent's true return.
     """
 
-    def __init__(self, world: RunWorld, told: Callable[[int, Policy], None]):
+    def __init__(self, world: RunWorld, told: Callable[[int, str], None]):
         self.world, self.told = world, told
         self._updates: int | None = None
         self._steps: list[int] = []
         self._values: list[float] = []
         self._glanced: list[np.ndarray] = []
+        self._returned, self._again = "", 0.0
 
     def see(self, steps: int, policy: Policy) -> None:
         """Judge the policy as it is after some environment steps; one that was not updated since the last time is as it was."""
-        self.told(steps, policy)
         updates = getattr(getattr(policy, "model", None), "_n_updates", None)  # SB3 counts its gradient steps there
         if updates is not None and updates == self._updates:
             value, glanced = self._values[-1], self._glanced[-1]
@@ -40,6 +44,31 @@ class Glances:
         self._steps.append(steps)
         self._values.append(value)
         self._glanced.append(glanced)
+        self.told(steps, self._return_of(glanced))
+
+    def _return_of(self, glanced: np.ndarray) -> str:
+        """The mean true return of the last point whose episodes were drawn: seldom, so that telling it takes no time."""
+        start = time.monotonic()
+        if start >= self._again:
+            (returns,), _ = self.world.returns([glanced])
+            self._returned = f"mean return {np.mean(returns):.4g}"
+            self._again = start + SELDOM * (time.monotonic() - start)
+        return self._returned
+
+    def arrays(self) -> Mapping[str, np.ndarray]:
+        """All points so far, as a checkpoint keeps them."""
+        if not self._steps:
+            return {}
+        updates = np.array(-1 if self._updates is None else self._updates)
+        return {"steps": np.array(self._steps), "values": np.array(self._values), "glanced": np.stack(self._glanced),
+                "updates": updates}  # fmt: skip
+
+    def take(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from the points of a checkpoint."""
+        if arrays:
+            self._steps, self._values = arrays["steps"].tolist(), arrays["values"].tolist()
+            self._glanced = list(arrays["glanced"])
+            self._updates = int(arrays["updates"]) if arrays["updates"] >= 0 else None
 
     def curve(self) -> Curve:
         """All points, with the returns of sampled episodes."""

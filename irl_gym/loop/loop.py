@@ -70,6 +70,9 @@ MAKERS: dict[str, tuple[Make, ...]] = dict(
 )
 """Who makes each stage, in order: all of them whose needs are there."""
 
+UNFINISHED = 0.999
+"""Share of a stage that is told at most before its end."""
+
 
 class Loop:
     """One run: the stages, in order, over a folder. Whoever makes it holds the folder (`own_files.held`).
@@ -103,7 +106,7 @@ class Loop:
     path: Path
     """Of the folder."""
     report_progress: OnProgress
-    """Told how far each stage is."""
+    """Told by stages how far they are; their ends are told when what they made is in its place."""
     config: Mapping[str, Any]
     """The experiment as json."""
 
@@ -115,8 +118,9 @@ class Loop:
         command: Sequence[str] | None = None,
     ):
         self.experiment = experiment
-        self.report_progress = on_progress or (lambda stage, share: None)
-        self.report_progress("table", 0.0)
+        self._told = on_progress or (lambda stage, share, told: None)
+        self.report_progress = lambda stage, share, told: self._told(stage, share and min(share, UNFINISHED), told)
+        self._told("table", 0.0, "")
         start = time.perf_counter()
         for features in (getattr(experiment.learner, "features", None), experiment.features):
             check_savable(features)
@@ -126,7 +130,7 @@ class Loop:
         )  # fmt: skip
         path, config = self.path, self.config = Path(out), experiment.to_json()
         claim(path, config)
-        self.world = place_of(experiment, self.env, path, lambda share: self.report_progress("table", share))
+        self.world = place_of(experiment, self.env, path, lambda share, told: self.report_progress("table", share, told))
         self.table_seconds = time.perf_counter() - start
         self.folder = RunFolder(path, config)
         write_version(path, command)
@@ -134,13 +138,15 @@ class Loop:
         table_kept = (path / TABLE).exists()
         self.world.keep_table(path)
         record_start(path, table_kept=table_kept)
-        self.report_progress("table", 1.0)
+        states = self.world.states
+        self._told("table", 1.0, "none, as it is stepped" if states is None else f"{states.n_states:,} states")
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""
-        self.report_progress(name, 0.0)
+        self._told(name, 0.0, "")
         record = self.folder.run(name, lambda folder: self._made(name, folder))
-        self.report_progress(name, 1.0)
+        stages.under_way(self.path, name).unlink(missing_ok=True)
+        self._told(name, 1.0, "kept" if record.get("kept") else "")
         return record
 
     def _made(self, name: str, folder: Path) -> dict[str, Any]:

@@ -35,13 +35,16 @@ def recover_and_retrain(
         diagnosis.json, ambiguity.npz                 what the doctor says; for small tables, how far the reward is left open
         report.html                                   all of it, on a page
     The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
-    that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage.
+    that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage, and
+    inside the training of an agent, of which at most a twentieth and one rollout are repeated. On a table that
+    leaves the same bytes too; where the environment is stepped its episodes begin anew, and the run says at which step.
     .stages/ has the sha256 of every file that is read again: one that is another is named, and nothing is made from it.
 
     Args:
         experiment: what to do.
         out: a new or empty folder, or one that holds this same experiment.
-        on_progress: called with a stage and the share of it that is done.
+        on_progress: called with a stage, the share of it that is done (None where that cannot be known), and what else is
+            known, such as the agent's mean return.
         command: the command that reproduces the run, kept in run.json; None where it is started from Python.
 
     Raises:

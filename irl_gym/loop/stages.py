@@ -12,6 +12,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl_gym.agents.checkpoints import Checkpoint
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
 from irl_gym.demonstrations.choices import AfterEnd
@@ -42,17 +43,27 @@ from irl_gym.tables.tabulation import Tabulation
 
 REWARD = "reward.npz"
 """Where the recovered reward is kept."""
-OnProgress = Callable[[str, float], None]
-"""Called with a stage and the share of it that is done, from 0 to 1."""
+OnProgress = Callable[[str, float | None, str], None]
+"""Called with a stage, the share of it that is done, from 0 to 1, None where that cannot be known, and what else is known."""
+
+
+def under_way(path: Path, stage: str) -> Path:
+    """Where the training of a stage is kept until the stage is finished, in the folder of a run."""
+    return path / f".{stage}.tmp.npz"
 
 
 def planned_expert(
-    folder: Path, teacher: Planner, world: RunWorld, epsilon: float, report_progress: OnProgress
-) -> dict[str, Any]:
+    folder: Path, path: Path, teacher: Planner, world: RunWorld, epsilon: float, config: Mapping[str, Any],
+    report_progress: OnProgress,
+) -> dict[str, Any]:  # fmt: skip
     """An expert that plans, or learns, under the true reward."""
-    policy = world.train(logged(teacher, folder / LOGS / "expert"), None, _share(report_progress, "expert", teacher))
+    kept = Checkpoint(under_way(path, "expert"), config)
+    tell = _telling(report_progress, "expert", teacher, kept)
+    policy = world.train(
+        logged(teacher, folder / LOGS / "expert", kept), None, lambda steps, policy: tell(steps, _earned(policy))
+    )
     world.keep(policy, folder, "expert", epsilon)
-    made = {"environment_steps": 0, **teacher.trained()} if isinstance(teacher, FromFile) else _steps(policy)
+    made = {"environment_steps": 0, **teacher.trained()} if isinstance(teacher, FromFile) else _steps(policy, kept)
     return {"planner": type(teacher).__name__, "how": how_of(teacher), **made}
 
 
@@ -140,20 +151,21 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
 
 
 def retrained_agent(
-    folder: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
-    certificate: Mapping[str, Any], report_progress: OnProgress,
+    folder: Path, path: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
+    certificate: Mapping[str, Any], config: Mapping[str, Any], solved: Mapping[str, Any], report_progress: OnProgress,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
     paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
-    glances = Glances(world, _share(report_progress, "agent", retrainer))
+    kept = Checkpoint(under_way(path, "agent"), {"config": config, "reward": solved["sha256"]})
+    kept.seen = glances = Glances(world, _telling(report_progress, "agent", retrainer, kept))
     log = folder / LOGS / "retrained"
-    policy = world.train(logged(retrainer, log), paid, glances.see)
+    policy = world.train(logged(retrainer, log, kept), paid, glances.see)
     world.keep(policy, folder, "agent")
     curve = glances.curve()
     write_curve(curve, folder / "learning_curve.csv")
     if isinstance(retrainer, SB3):
         log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
-    return {"planner": type(retrainer).__name__, "how": how_of(retrainer), **_steps(policy)}
+    return {"planner": type(retrainer).__name__, "how": how_of(retrainer), **_steps(policy, kept)}
 
 
 def metrics(
@@ -175,11 +187,24 @@ def metrics(
     return {}
 
 
-def _share(report_progress: OnProgress, stage: str, planner: Planner) -> Callable[[int, Policy], None]:
+def _telling(report_progress: OnProgress, stage: str, planner: Planner, kept: Checkpoint) -> Callable[[int, str], None]:
+    """Tells how far a training is, what its agent earns, and where it went on after a kill."""
     total = max(1, getattr(planner, "total_timesteps", 1))
-    return lambda steps, _: report_progress(stage, min(1.0, steps / total))
+
+    def tell(steps: int, earned: str) -> None:
+        went_on = "" if kept.went_on is None else f"went on at step {kept.went_on:,}"
+        report_progress(stage, min(1.0, steps / total), ", ".join(filter(None, (earned, went_on))))
+
+    return tell
 
 
-def _steps(policy: Policy) -> dict[str, int]:
-    """Environment steps that a policy was trained on."""
-    return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0}
+def _earned(policy: Policy) -> str:
+    """The mean return of the last episodes of a training under the true reward, as SB3 notes it; nothing before the first."""
+    noted = policy.model.ep_info_buffer if isinstance(policy, Agent) else None
+    return f"mean return {np.mean([one['r'] for one in noted]):.4g}" if noted else ""
+
+
+def _steps(policy: Policy, kept: Checkpoint) -> dict[str, Any]:
+    """Environment steps that a policy was trained on, and those at which it went on in another way than in one go."""
+    resumed = {"resumed_at": kept.resumed} if kept.resumed else {}
+    return {"environment_steps": policy.model.num_timesteps if isinstance(policy, Agent) else 0, **resumed}

@@ -33,14 +33,14 @@ ON_COMMAND_LINE: dict[type[Exception], str] = {
 """How the mends of errors are asked for there."""
 
 
-def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> RunWorld:
+def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float | None, str], None]) -> RunWorld:
     """The world of an experiment.
 
     Args:
         asked: the experiment.
         env: its environment.
         out: folder of the run, which is held (`own_files.held`), where a table may be kept, or an enumeration that was killed.
-        tell: told the share of the table that is made.
+        tell: told the share of the table that is made, None where that cannot be known, and what is known of it.
 
     Raises:
         InvalidParameter: cells asked for where states are discrete.
@@ -56,7 +56,9 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float],
         method: dict[str, Any] = {"successors": "sampled", "samples": asked.samples} if asked.samples else {}
         table = kept_table(out, env.observation_space)  # as the cells of an earlier start were kept
         if table is None:
-            table = discretize(env, gamma=asked.gamma, bins=asked.bins, seed=seed, **method)
+            table = discretize(
+                env, gamma=asked.gamma, bins=asked.bins, seed=seed, on_progress=lambda share: tell(share, ""), **method
+            )
         return TableWorld(env, table, asked.num_envs or 64, seed, limit)
     try:
         return TableWorld(env, _table(asked, env, out, tell), asked.num_envs or 64, seed, limit)
@@ -99,7 +101,7 @@ def _instead(error: NotTabular | NotDiscrete, env: gym.Env) -> str:
     return "".join(f" {way}" for way in ways)
 
 
-def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], None]) -> Tabulation:
+def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float | None, str], None]) -> Tabulation:
     """The table that an earlier start kept, or a new one; an enumeration that was killed is continued."""
     kept = kept_table(out, env.observation_space)
     if kept is not None:
@@ -107,4 +109,11 @@ def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float], N
     by = asked.table or Enumeration(known=True)
     if isinstance(by, Enumeration) and by.checkpoint is None:
         by = replace(by, checkpoint=out / UNDER_WAY)
-    return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=lambda done, of: tell(done / max(of, 1)))
+    return tabulate(env, gamma=asked.gamma, by=by, seed=asked.seed, progress=telling(by, tell))
+
+
+def telling(by: Any, tell: Callable[[float | None, str], None]) -> Callable[[int, int], None]:
+    """What a way to make a table is to call with how much is done, and of how much; it tells the share, where that is known."""
+    if isinstance(by, Enumeration):  # how many states there are is known at the end only
+        return lambda done, of: tell(None, f"{of:,} states found, {done:,} tried")
+    return lambda done, of: tell(done / max(of, 1), "")

@@ -22,6 +22,7 @@ from irl_gym.judging.scores import EXPERT, REFERENCES, RETRAINED
 from irl_gym.judging.shares import MUCH, judged, judgements
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.identity import ENVIRONMENT
+from irl_gym.runs.scorecard import resumed_told
 from irl_gym.runs.summary import Report
 
 ABOUT_THE_GIVEN = ("blind-expert", "dropped-actions")
@@ -171,5 +172,7 @@ def _stages(stages: Mapping[str, Mapping[str, Any]], metrics: Mapping[str, Any])
         steps = f"{taken:,}" if taken else ""
         if name == "agent" and taken and scored:
             steps += " (did not stay at score 0.99)" if crossing is None else f" (score 0.99 or more after {crossing:,})"
+        resumed = resumed_told(record)
+        steps += f" ({resumed})" if resumed else ""
         table.add_row(name, f"{record['seconds']:.1f}{' (kept)' if record.get('kept') else ''}", steps)
     return table

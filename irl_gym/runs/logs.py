@@ -1,4 +1,4 @@
-"""Logs of training as TensorBoard reads them: Stable-Baselines3's own scalars, and a run's learning curve beside them.
+"""What training leaves as it goes on: checkpoints, and logs as TensorBoard reads them, a run's learning curve beside them.
 
 Event files hold the time and the host's name, so the same seed does not give the same bytes.
 """
@@ -12,26 +12,29 @@ import numpy as np
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
+from irl_gym.agents.checkpoints import Checkpoint
 from irl_gym.agents.planners import SB3, Agent, Planner, Progress
 
 
 @dataclass(frozen=True)
 class Logged:
-    """SB3 with a log. It is no field of SB3, so that the configuration of a run says nothing of it."""
+    """SB3 with a log and a checkpoint. They are no fields of SB3, so that the configuration of a run says nothing of them."""
 
     planner: SB3
     """Trains."""
     log: Path
     """Folder of TensorBoard's files."""
+    checkpoint: Checkpoint
+    """Where the training is kept while it is under way."""
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Agent:
-        """Train a new agent."""
-        return self.planner.plan(env, gamma=gamma, seed=seed, progress=progress, log=self.log)
+        """Train a new agent, or go on with one."""
+        return self.planner.plan(env, gamma=gamma, seed=seed, progress=progress, log=self.log, checkpoint=self.checkpoint)
 
 
-def logged(planner: Planner, log: Path) -> Planner:
-    """The planner, with a log of its training if it trains."""
-    return Logged(planner, log) if isinstance(planner, SB3) else planner
+def logged(planner: Planner, log: Path, checkpoint: Checkpoint) -> Planner:
+    """The planner, with a log and a checkpoint of its training if it trains."""
+    return Logged(planner, log, checkpoint) if isinstance(planner, SB3) else planner
 
 
 def log_scalars(log: Path, steps: np.ndarray, scalars: Mapping[str, np.ndarray]) -> None:

@@ -61,7 +61,7 @@ def scorecard(
         "policies": policies,
         **scale_told(scale),
         "reward": reward_told(certificate) | learned_told(records["reward"]) | on_table,
-        "training": {"environment_steps": records["agent"].get("environment_steps", 0), **settled(curve, scale)},
+        "training": {**training_told(records["agent"]), **settled(curve, scale)},
         "table": None if table is None else table_told(table, horizon),
         "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"]),
     }  # fmt: skip
@@ -99,6 +99,18 @@ def shown_told(record: Mapping[str, Any]) -> dict[str, Any]:
 def trained_told(record: Mapping[str, Any]) -> dict[str, Any]:
     """What is told of an expert's training, from its stage's record."""
     return {key: value for key, value in record.items() if key in TRAINED}
+
+
+def training_told(record: Mapping[str, Any]) -> dict[str, Any]:
+    """What is told of the agent's training, from its stage's record: its steps, and where it did not go on as in one go."""
+    resumed = {"resumed_at": record["resumed_at"]} if "resumed_at" in record else {}
+    return {"environment_steps": record.get("environment_steps", 0), **resumed}
+
+
+def resumed_told(record: Mapping[str, Any]) -> str:
+    """That a training was resumed where it cannot be set to the state it was in, as the end of a sentence; empty where not."""
+    steps = " and ".join(f"{one:,}" for one in record.get("resumed_at", ()))
+    return f"resumed at step {steps}: its result may be another than that of training in one go" if steps else ""
 
 
 def how_of(planner: Any) -> str:

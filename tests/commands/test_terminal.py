@@ -1,10 +1,12 @@
 """What scripts say in a terminal."""
 
 import io
+import re
 
 import pytest
 from rich.console import Console
 
+from irl_gym.commands import terminal
 from irl_gym.commands.terminal import DEFECT, exit_code, print_error, stage_bars
 from irl_gym.errors import RunIncomplete
 from irl_gym.facts import harmless
@@ -25,8 +27,56 @@ def test_each_stage_has_one_bar_on_a_terminal():
     assert len(bars) == 2 and "expert" in bars[0] and "100 %" in bars[0] and "reward" in bars[1] and " 25 %" in bars[1]
 
 
-def test_no_bar_is_drawn_where_there_is_no_terminal():
-    assert shown(terminal=False).strip() == ""
+def test_a_bar_of_which_no_share_is_known_says_what_is_known():
+    said = io.StringIO()
+    with stage_bars(Console(file=said, force_terminal=True, width=100)) as show:
+        show("table", None, "[12] states found")
+    line = said.getvalue().rpartition("\x1b[2K")[2].splitlines()[0]
+    assert "[12] states found" in line and "%" not in line and "left" not in line
+
+
+def test_plain_lines_tell_begin_and_end_where_there_is_no_terminal():
+    said = shown(terminal=False)
+    assert re.sub(r"\d+\.\d s", "N s", said) == "expert: begun\nexpert: done in N s\nreward: begun\n" and "\x1b" not in said
+
+
+class Clock:
+    """A clock that is set."""
+
+    now = 0.0
+
+    def monotonic(self):
+        return self.now
+
+
+def told(monkeypatch, *moments):
+    """The plain lines of a stage that was told of at these times, each with a share and what else is known."""
+    said, clock = io.StringIO(), Clock()
+    monkeypatch.setattr(terminal, "time", clock)
+    with stage_bars(Console(file=said, force_terminal=False)) as show:
+        for clock.now, share, more in moments:
+            show("agent", share, more)
+    return said.getvalue().splitlines()
+
+
+def test_a_stage_has_a_plain_line_in_ten_seconds_at_most(monkeypatch):
+    lines = told(monkeypatch, (0.0, 0.0, ""), *((one / 2, one / 100, "") for one in range(1, 100)), (50.0, 1.0, ""))
+    assert len(lines) == 2 + 4 and lines[0] == "agent: begun" and lines[-1] == "agent: done in 50 s"
+
+
+def test_what_is_left_follows_from_the_pace_so_far(monkeypatch):
+    lines = told(monkeypatch, (0.0, 0.0, ""), (2.0, 0.5, "mean return 3"), (12.0, 0.75, "mean return 4"))
+    assert lines[1] == "agent: 75 %, 12 s, about 10 s left, mean return 4"
+
+
+def test_nothing_is_said_of_what_is_left_where_the_share_is_not_known(monkeypatch):
+    lines = told(monkeypatch, (0.0, 0.0, ""), (11.0, None, "7 states found"), (22.0, None, "9 states found"))
+    assert lines[1:] == ["agent: 11 s, 7 states found", "agent: 22 s, 9 states found"]
+
+
+def test_a_stage_that_is_asked_for_again_begins_once(monkeypatch):
+    lines = told(monkeypatch, (0.0, 0.0, ""), (1.0, 1.0, "kept"), (50.0, 0.0, ""), (60.0, 1.0, "kept"))
+    assert lines == ["agent: begun", "agent: done in 1.0 s, kept"]
 
 
 def test_bars_end_when_the_work_fails():

@@ -34,7 +34,7 @@ def tabular():
 
 @pytest.mark.parametrize("world", [stepped, tabular])
 def test_an_agent_is_judged_again_only_after_an_update(world):
-    policy, glances = Counting(), Glances(world(), lambda steps, policy: None)
+    policy, glances = Counting(), Glances(world(), lambda steps, told: None)
     asked = []
     for steps, updates in ((0, 0), (64, 0), (128, 4)):
         policy.model._n_updates = updates
@@ -45,8 +45,32 @@ def test_an_agent_is_judged_again_only_after_an_update(world):
 
 @pytest.mark.parametrize("world", [stepped, tabular])
 def test_a_curve_has_a_point_for_each_look_and_the_same_for_the_same_agent(world):
-    policy, glances = Counting(), Glances(world(), lambda steps, policy: None)
+    policy, glances = Counting(), Glances(world(), lambda steps, told: None)
     for steps in (0, 64, 128):
         glances.see(steps, policy)
     curve = glances.curve()
     assert len(set(curve.value)) == 1 and list(curve.steps) == [0, 64, 128]
+
+
+@pytest.mark.parametrize("world", [stepped, tabular])
+def test_a_curve_that_goes_on_from_what_was_kept_is_the_same(world):
+    policy, told = Counting(), []
+    whole, begun, gone_on = (Glances(world(), lambda steps, told_: told.append((steps, told_))) for _ in range(3))
+    for steps in (0, 64, 128):
+        whole.see(steps, policy)
+    for steps in (0, 64):
+        begun.see(steps, policy)
+    gone_on.take(begun.arrays())
+    asked = policy.asked
+    gone_on.see(128, policy)
+    ours, theirs = whole.curve(), gone_on.curve()
+    assert policy.asked == asked and all(
+        np.array_equal(getattr(ours, key), getattr(theirs, key), equal_nan=True) for key in vars(ours)
+    )
+
+
+@pytest.mark.parametrize("world", [stepped, tabular])
+def test_the_mean_return_is_told_as_the_agent_trains(world):
+    told = []
+    Glances(world(), lambda steps, known: told.append((steps, known))).see(64, Counting())
+    assert told[0][0] == 64 and told[0][1].startswith("mean return ")

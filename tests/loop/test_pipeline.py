@@ -48,7 +48,7 @@ def planned(tmp_path_factory):
     """A run whose agent is planned, and the share that each stage was told last."""
     seen = {}
     asked = small(retrain=ValueIteration(), shaping=False)
-    made = recover_and_retrain(asked, tmp_path_factory.mktemp("planned"), lambda stage, share: seen.update({stage: share}))
+    made = recover_and_retrain(asked, tmp_path_factory.mktemp("planned"), lambda stage, share, _: seen.update({stage: share}))
     return made, seen
 
 

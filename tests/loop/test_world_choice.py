@@ -207,8 +207,15 @@ def test_start_seeds_make_the_starts(tmp_path):
 
 def test_progress_grows_up_to_1(tmp_path):
     told = []
-    begun(walk(table=Interaction(400)), tmp_path / "run", lambda stage, share: told.append(share))
+    begun(walk(table=Interaction(400)), tmp_path / "run", lambda stage, share, known: told.append(share))
     assert told == sorted(told) and told[0] == 0.0 and told[-1] == 1.0
+
+
+def test_an_enumeration_tells_the_states_found_and_no_share_of_what_is_not_known(tmp_path):
+    told = []
+    begun(walk(), tmp_path / "run", lambda *one: told.append(one))
+    assert told[0] == ("table", 0.0, "") and told[-1] == ("table", 1.0, "6 states")
+    assert {share for _, share, _ in told[1:-1]} == {None} and told[-2][2] == "5 states found, 5 tried"
 
 
 def test_copies_are_as_many_as_asked_for(tmp_path):

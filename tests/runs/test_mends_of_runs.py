@@ -41,7 +41,7 @@ def asking(**asked):
 
 
 def place(root, env=LAKE, **asked):
-    return place_of(asking(**asked), env, root, lambda share: None)
+    return place_of(asking(**asked), env, root, lambda share, told: None)
 
 
 def stepped(env=CAR):

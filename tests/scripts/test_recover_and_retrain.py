@@ -11,6 +11,7 @@ from stopped import HANG, run_until
 
 from irl_gym.commands import run as run_command
 from irl_gym.commands.arguments import Arguments
+from irl_gym.runs.identity import STAGES
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "recover_and_retrain.py"
@@ -40,8 +41,13 @@ def test_the_report_names(finished, word):
     assert word in finished[0].stdout
 
 
-def test_the_script_is_quiet_when_not_on_a_terminal(finished):
-    assert finished[0].stderr == "" and "\x1b" not in finished[0].stdout
+def test_each_stage_has_plain_lines_where_there_is_no_terminal(finished):
+    said = finished[0].stderr.splitlines()
+    assert said[0] == "loading: begun" and said[1].startswith("loading: done in ")
+    assert "\x1b" not in finished[0].stderr + finished[0].stdout
+    stages = [name for name in ("table", *STAGES) for _ in range(2)]
+    assert [line.split(":")[0] for line in said[2:] if "%" not in line] == stages
+    assert any(line.startswith("agent: done in ") and "mean return " in line for line in said)
 
 
 def test_the_last_line_names_the_page(finished):
@@ -149,11 +155,13 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
 
 
 AGENT = "irl_gym.agents.planners:SB3.plan"
+CHECKPOINT = "irl_gym.loop.learning_curve:Glances.arrays"
+LONGER = ("--total-timesteps", "12288", "--episodes", "10", "--env-kwargs", "is_slippery=false")
 
 
 def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
     made = run_until(SCRIPT, "--out", "run", "--episodes", "10", where=AGENT, sent=signal.SIGINT, cwd=tmp_path)
-    assert made.returncode == 130 and made.stderr.startswith("Stopped. The same command continues")
+    assert made.returncode == 130 and made.stderr.splitlines()[-1].startswith("Stopped. The same command continues")
 
 
 def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
@@ -165,3 +173,40 @@ def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path
     made = run(*arguments, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept
+
+
+def test_the_first_line_is_there_before_anything_heavy_is_imported(tmp_path):
+    code = """
+import io, sys
+from irl_gym.commands.door import main
+class Watch:
+    seen = None
+    def find_spec(self, name, *_):
+        if name in ("torch", "gymnasium", "cvxpy") and Watch.seen is None:
+            Watch.seen = sys.stderr.getvalue()
+sys.meta_path.insert(0, Watch())
+sys.stderr = io.StringIO()
+main(["run", "--env-id", "Nothing-v0"])
+print(Watch.seen)
+"""
+    made = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=HANG)
+    assert made.stdout == "loading: begun\n\n", made.stderr
+
+
+@pytest.fixture(scope="module")
+def in_one_go(tmp_path_factory):
+    cwd = tmp_path_factory.mktemp("once")
+    assert run(*LONGER, "--out", "once", cwd=cwd).returncode == 0
+    return cwd / "once"
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
+def test_an_agent_that_was_stopped_in_its_training_goes_on_and_ends_in_the_same_bytes(in_one_go, tmp_path, sent):
+    made = run_until(SCRIPT, *LONGER, "--out", "run", where=CHECKPOINT, nth=4, sent=sent, cwd=tmp_path)
+    assert made.returncode == (130 if sent == signal.SIGINT else -sent), made.stderr
+    assert (tmp_path / "run" / ".agent.tmp.npz").exists() and not (tmp_path / "run" / "agent.zip").exists()
+    made = run(*LONGER, "--out", "run", cwd=tmp_path)
+    assert made.returncode == 0 and "went on at step 6,144" in made.stderr, made.stderr
+    assert not (tmp_path / "run" / ".agent.tmp.npz").exists()
+    for name in ("agent_policy.npz", "learning_curve.csv", "metrics.json"):
+        assert (tmp_path / "run" / name).read_bytes() == (in_one_go / name).read_bytes(), name

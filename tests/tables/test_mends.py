@@ -273,7 +273,7 @@ OFFERED = {
 def test_counting_is_offered_by_a_run_where_it_does_not_lead_to_the_same_error(tmp_path, name):
     env, error, says = OFFERED[name]
     with pytest.raises(error) as caught:
-        place_of(Experiment("Corridor-v0", GAMMA, learner=FiniteLP()), env, tmp_path, lambda share: None)
+        place_of(Experiment("Corridor-v0", GAMMA, learner=FiniteLP()), env, tmp_path, lambda share, told: None)
     assert says in str(caught.value) and bool(says) == ("--table sample" in str(caught.value))
     if says:
         assert tabulate(env, gamma=GAMMA, by=Interaction(500)).mdp.n_states == 7

@@ -37,6 +37,7 @@ from irl_gym.runs.scorecard import (
     settled,
     shown_told,
     table_told,
+    training_told,
 )
 from irl_gym.tables.tabulation import Tabulation
 
@@ -110,8 +111,7 @@ def claims(
         yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
-    taken = stages["agent"].get("environment_steps", 0)
-    yield Claim(".stages/agent.json", {"training": {"environment_steps": taken}})
+    yield Claim(".stages/agent.json", {"training": training_told(stages["agent"])})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
         told = table_told(table, metrics["table"].get("horizon") if known["given"] else None)

@@ -13,6 +13,7 @@ from irl_gym.reports.page.scene import Scene, chosen
 from irl_gym.reports.page.sections.absent import LEARNING, WIDTHS
 from irl_gym.reports.page.sections.compared import of_states
 from irl_gym.reports.page.sections.section import Section
+from irl_gym.runs.scorecard import resumed_told
 from irl_gym.written import listed, number
 
 COLOURS = tuple(f"run{i}" for i in range(6))
@@ -64,6 +65,8 @@ def learning(curve: Curve, policies: Mapping[str, Any], training: Mapping[str, A
         made.append(_returns(curve, policies))
     told = "" if policies[agent_of(policies)]["score"] is None else _settled(training)
     lead = f"The agent is paid by the learned reward only. Drawn is what that earned under the true reward.{told}"
+    resumed = resumed_told(training)
+    lead += f" The training was {resumed}." if resumed else ""
     return Section(*LEARNING, lead, made)
 
 

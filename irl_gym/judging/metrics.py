@@ -12,7 +12,7 @@ import numpy as np
 from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import InvalidParameter
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, occupancy, optimum, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import occupancy, optimum, policy_evaluation, policy_iteration
 from irl_gym.mdp.planning.howard import OUTWARDS, Optimum
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, as_reward
@@ -90,7 +90,7 @@ def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: An
         InvalidParameter: a horizon that is not a whole number of at least 0.
     """
     if horizon is None:
-        return float(checked_mdp(mdp).d0 @ evaluate_policy(mdp, as_reward(reward), policy))
+        return float(checked_mdp(mdp).d0 @ policy_evaluation(mdp, as_reward(reward), policy))
     steps = int(checked_number("horizon", horizon, "a whole number of steps of at least 0, or None", least=0, whole=True))
     mixing = checked_mdp(mdp).mixing(policy)
     P_pi, R_pi = mixing @ mdp.P, mixing @ as_reward(reward).expected(mdp).ravel()

@@ -15,7 +15,7 @@ from irl_gym.judging.curves import Curve
 from irl_gym.judging.metrics import optimal_actions
 from irl_gym.loop.worlds import World
 from irl_gym.mdp.episodes import Episode, seen_parts
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -69,7 +69,7 @@ def _pictures(
         taken = (expert > 0) & known[:, None]
     else:
         taken = as_distribution(expert, mdp.n_states, mdp.n_actions) > 0
-    values = [evaluate_policy(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
+    values = [policy_evaluation(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
     values = [np.where(unknown & ~mdp.terminal, np.nan, V) for V in values]  # nothing is known of the expert there
     if isinstance(table.states, Cells) and len(table.states.shape) == 2:
         told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)

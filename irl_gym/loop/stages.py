@@ -34,14 +34,15 @@ from irl_gym.loop.worlds import World
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.runs.certificates import certificate_of, facts_in
 from irl_gym.runs.experiment import class_name
 from irl_gym.runs.logs import log_scalars, logged
 from irl_gym.runs.scorecard import came_about, how_of, outcome_of, scorecard
 from irl_gym.tables.tabulation import Tabulation
 
-REWARD = "reward.npz"
-"""Where the recovered reward is kept."""
+REWARD, SHAPED = "reward.npz", "reward_shaped.npz"
+"""Where the recovered reward is kept; and, of a table, what an agent of anybody's own is paid (`LearnedReward(env, file)`)."""
 OnProgress = Callable[[str, float], None]
 """Called with a stage and the share of it that is done, from 0 to 1."""
 
@@ -118,6 +119,9 @@ def learned_outcome(
     record = {"learner": class_name(learner), "how": outcome_of(learner), **outcome.record()}
     _check_kept(learner, certificate, record)
     write_json(folder / "certificate.json", certificate)
+    if table is not None and outcome.reward is not None:
+        tabular: Any = world.tabular(outcome.reward)
+        ShapedReward.of(tabular, table.mdp, certificate["proof"].get("margin_cap") or None).save(folder / SHAPED)
     if isinstance(problem.environment, Simulator):
         record["stats"]["inner"] = type(problem.environment.planner).__name__
     return record

@@ -24,7 +24,7 @@ from irl_gym.judging.curves import EPISODES, sampled_returns, two_returns
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, collect, collect_from_table, empirical_policy
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, load_actions
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.shaping import ExpectedAdvantage, typical_loss
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.layouts import GridLayout, grid_layout
@@ -122,7 +122,7 @@ class TableWorld:
         plain = self.tabular(reward)
         if not shaped:
             return plain
-        return ExpectedAdvantage(margin_cap or typical_loss(plain, self.mdp)).apply(plain, self.mdp)
+        return ShapedReward.of(plain, self.mdp, margin_cap or None).paid
 
     def pays(
         self,

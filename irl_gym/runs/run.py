@@ -24,10 +24,11 @@ from irl_gym.judging.diagnoses.plain_words import with_names
 from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.films import Film, load_film
 from irl_gym.runs.identity import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
-from irl_gym.runs.reading.belonging import left_open, strangers
+from irl_gym.runs.reading.belonging import left_open, misshapen, strangers
 from irl_gym.runs.reading.run_reader import RunReader
 from irl_gym.runs.reading.verified import Claim, again, claims, recomputed, with_again
 from irl_gym.runs.scorecard import reward_told
@@ -262,6 +263,9 @@ def _with_proof(run: Run, reader: RunReader) -> Run:
     except InvalidInput as error:
         mend = "delete table.npz, expert.npz and reward.npz, and what they hold is made again"
         raise reader.incomplete(f"its table, expert and reward do not bear out its record: {error}; {mend}") from error
+    shaped = reader.maybe("reward_shaped.npz", ShapedReward.load)  # earlier versions kept none
+    if shaped is not None and (fault := misshapen(shaped, reward, run.table.mdp)) is not None:
+        raise reader.incomplete(fault)
     metrics = run.metrics
     if now is not None:
         _check_claims(now[0], run, reader)

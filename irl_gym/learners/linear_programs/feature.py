@@ -145,7 +145,7 @@ class FeatureLP:
                 return self._fit_table(world, expert, states, solving)
         raise InvalidMDP(
             f"the world is a {type(world).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
-            "GenerativeModel(env, gamma)."
+            "GenerativeModel(env, gamma), first, and then the expert."
         )
 
     @property

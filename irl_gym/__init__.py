@@ -11,6 +11,7 @@
     worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns
     doctor(result, mdp, expert)               why a reward came out zero, flat or useless, in sentences, each with a mend
     LearnedReward(env, result, shaping=table) the environment, paying the learned reward so that agents learn it
+    plot(result, env)                         a picture of a reward, a policy or values, on the environment's map
     TabularEnv, TabularVecEnv                 a table as an environment, or as thousands of copies for Stable-Baselines3
     SB3("PPO").plan(env, gamma=...)           an agent trained on it; ValueIteration().plan(...) plans exactly
     collect, write_minari, read_minari        demonstrations

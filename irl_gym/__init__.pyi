@@ -28,6 +28,7 @@ from .mdp.planning.dynamic_programming import value_iteration as value_iteration
 from .mdp.policies import TabularPolicy as TabularPolicy
 from .mdp.rewards import TabularReward as TabularReward
 from .mdp.tabular_mdp import TabularMDP as TabularMDP
+from .reports.plot import plot as plot
 from .runs.experiment import Experiment as Experiment
 from .tables.discretize import discretize as discretize
 from .tables.tabulate import tabulate as tabulate

@@ -21,8 +21,7 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.reports import plotting
 from irl_gym.reports.cell_maps import draw_actions, draw_planes
-from irl_gym.spaces.listed_states import usual_observation
-from irl_gym.spaces.names import Names, action_names, state_name
+from irl_gym.spaces.names import Names
 from irl_gym.tables.cells import Cells
 from irl_gym.tables.layouts import GridLayout
 from irl_gym.tables.tabulation import Tabulation
@@ -45,9 +44,7 @@ def of_table(
     env: gym.Env, env_id: str | None,
 ) -> dict[str, Any]:  # fmt: skip
     """Rewards, values and policies state by state."""
-    usual = usual_observation(table.states)
-    names = Names(action_names(env), lambda row: state_name(env_id, table.states.decode(row), None, usual))
-    return _kept(folder, _pictures(table, tabular, expert, agent, layout, names))
+    return _kept(folder, _pictures(table, tabular, expert, agent, layout, Names.of(env, table.states, env_id)))
 
 
 def _kept(folder: Path, pictures: Mapping[str, plotting.Figure]) -> dict[str, Any]:

@@ -26,8 +26,8 @@ from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, load_ac
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
-from irl_gym.spaces.states import StateIndex, States
-from irl_gym.tables.layouts import GridLayout, grid_layout
+from irl_gym.spaces.states import States
+from irl_gym.tables.layouts import GridLayout, map_of
 from irl_gym.tables.table_files import keep_table
 from irl_gym.tables.tabulation import Tabulation
 
@@ -84,8 +84,7 @@ class TableWorld:
     @property
     def layout(self) -> GridLayout | None:
         """The map, where the table is exact and its rows are the cells; not where only some cells are listed."""
-        exact = self.table.evidence.exact and isinstance(self.states, StateIndex)
-        return grid_layout(self.env, self.mdp) if exact else None
+        return map_of(self.env, self.table)
 
     @property
     def random(self) -> np.ndarray:

@@ -151,7 +151,8 @@ def collect(
     if not hasattr(policy, "predict"):
         raise InvalidPolicy(
             f"policy is a {type(policy).__name__}: expected one that acts on observations, with `predict`. Make one of a "
-            "table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), table.states)`."
+            "table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), "
+            "table.states)`."
         )
     return _stepped(env, policy, n_episodes, seed, deterministic, max_episode_steps)
 

@@ -24,6 +24,7 @@ from irl_gym.features.feature_maps import (
 )
 from irl_gym.mdp.rewards import TabularReward, read_archive, write_archive
 from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_size, take
 from irl_gym.spaces.states import States
 
@@ -32,7 +33,7 @@ _KINDS = {kind.__name__: kind for kind in (OneHot, Table, RadialBasis, Fourier, 
 
 
 @dataclass(frozen=True, eq=False)
-class LinearReward:
+class LinearReward(Record):
     """R(s) = alpha . phi(s), paid on arrival. Immutable.
 
     Raises:

@@ -18,12 +18,13 @@ from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import not_told
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
+from irl_gym.records import Record
 
 TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, eq=False)
-class Ties:
+class Ties(Record):
     """Which actions are as good as the best: decided by bounds of their values, rounding included."""
 
     tied: ActionSets
@@ -39,7 +40,7 @@ class Ties:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class Agreement(Record):
     """How often a policy does what a reward asks for, over the reachable states that are not terminal."""
 
     share: float
@@ -49,7 +50,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class Tie(Record):
     """A policy among those greedy under a learned reward: the worst or the best of them under the true one."""
 
     policy: np.ndarray
@@ -63,7 +64,7 @@ class Tie:
 
 
 @dataclass(frozen=True, eq=False)
-class Regret:
+class Regret(Record):
     """What a policy loses against an optimal one, in discounted value under the true reward."""
 
     value: float

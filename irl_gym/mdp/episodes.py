@@ -18,6 +18,7 @@ from irl_gym.errors import InvalidDemonstrations, InvalidParameter, InvalidPolic
 from irl_gym.mdp.policies import Policy, as_distribution
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
 
@@ -25,7 +26,7 @@ Ending = Literal["seen", "unseen", "followed", "dropped"]
 
 
 @dataclass(frozen=True, eq=False)
-class Episode:
+class Episode(Record):
     """One episode.
 
     Raises:
@@ -242,7 +243,7 @@ def _drawn(
 
 
 @dataclass(frozen=True, eq=False)
-class EmpiricalPolicy:
+class EmpiricalPolicy(Record):
     """What episodes say about the policy that made them, and where they say nothing."""
 
     counts: np.ndarray

@@ -18,6 +18,7 @@ from irl_gym._typing import ActionSets, Matrix
 from irl_gym.checks import any_array, checked_number, of_single_precision, shown_sum
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
 from irl_gym.files.archives import read_arrays
+from irl_gym.records import Record
 from irl_gym.spaces.states import States
 
 ACTIONS = 1
@@ -204,7 +205,7 @@ def generator(seed: int, stream: int = ACTIONS) -> np.random.Generator:
 
 
 @dataclass(frozen=True, eq=False)
-class TabularPolicy:
+class TabularPolicy(Record):
     """A table of action probabilities that acts on observations, with Stable-Baselines3's `predict`."""
 
     probabilities: Matrix

@@ -19,6 +19,7 @@ from irl_gym.errors import DamagedFile, InvalidReward
 from irl_gym.files.archives import json_in, read_arrays
 from irl_gym.files.own_files import write_arrays
 from irl_gym.mdp.tabular_mdp import TransitionTable, checked_mdp
+from irl_gym.records import Record
 
 FORMAT = "irl_gym.TabularReward/1"
 SOLVED_WITHIN = 1e-6
@@ -35,7 +36,7 @@ class RewardFunction(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class TabularReward:
+class TabularReward(Record):
     """A reward in a table: (S,) paid on arrival, or (S, A) paid for the step. Immutable.
 
     Raises:

@@ -17,6 +17,7 @@ from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.mdp.planning.dynamic_programming import backup, optimum
 from irl_gym.mdp.rewards import TabularReward, read_archive, write_archive
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.records import Record
 
 
 @runtime_checkable
@@ -59,7 +60,7 @@ class PositiveScaling:
 
 
 @dataclass(frozen=True, eq=False)
-class PotentialShaping:
+class PotentialShaping(Record):
     """R'(s, a) = E R + gamma E Phi(s') - Phi(s), with Phi = 0 at terminal states (Ng, Harada & Russell 1999, theorem 1).
 
     Every Q(s, a) falls by Phi(s), whatever the action. At a terminal state a potential would be paid and never taken back,
@@ -89,7 +90,7 @@ class PotentialShaping:
 
 
 @dataclass(frozen=True)
-class ExpectedAdvantage:
+class ExpectedAdvantage(Record):
     """R'(s, a) = A(s, a) = Q(s, a) - V(s) <= 0, optimal under the reward; potential shaping with Phi = V.
 
     What an agent pays is then what its action loses, at once: the optimal actions, 0, are greedy whatever the discount.
@@ -132,7 +133,7 @@ def typical_loss(reward: TabularReward, mdp: TabularMDP) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class ShapedReward:
+class ShapedReward(Record):
     """A learned reward with what an agent is paid in its place: its expected advantage, where losses count up to a clip.
 
     The same policies are optimal, and what an action loses is paid at once: values of the learned reward are large against

@@ -24,13 +24,14 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.files.own_files import whole
 from irl_gym.mdp.arrival_rewards import paid_on_arrival
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
 from irl_gym.reports import drawing
 from irl_gym.spaces.names import Names
 from irl_gym.tables.layouts import GridLayout
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Record):
     """A learning curve."""
 
     steps: np.ndarray

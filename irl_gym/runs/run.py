@@ -25,6 +25,7 @@ from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.records import Record
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.films import Film, load_film
 from irl_gym.runs.identity import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
@@ -43,7 +44,7 @@ METRICS = "metrics.json"
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Record):
     """What a run left."""
 
     path: Path

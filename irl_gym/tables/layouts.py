@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.tabulation import Tabulation
 
@@ -22,7 +23,7 @@ MOST_STARTS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class GridLayout:
+class GridLayout(Record):
     """The map that the first rows * columns states of a table fill row by row."""
 
     shape: tuple[int, int]

@@ -20,13 +20,14 @@ from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, check_reward_itself
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.programs.killable import check_limit
+from irl_gym.records import Record
 
 Reward = Matrix | TabularReward
 """(S, A) what a step pays in expectation, or a TabularReward of either kind."""
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Record):
     """An optimal policy with its values, and how far from optimal they can be."""
 
     V: Vector

@@ -27,7 +27,8 @@ class MinariEpisodes(Sequence):
     """
 
     def __init__(self, dataset: minari.MinariDataset, indices: Any, after_end: AfterEnd):
-        self.dataset, self.indices, self.after_end = dataset, np.asarray(indices), after_end
+        self.dataset, self.indices = dataset, np.asarray(indices)
+        self.after_end: AfterEnd = after_end
 
     def __len__(self) -> int:
         return len(self.indices)

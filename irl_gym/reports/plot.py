@@ -63,7 +63,7 @@ def plot(
     table = tabulate(env, gamma=ANY_GAMMA, check_steps=0) if table is None else table
     found, values = _told(what, kind, table)
     layout = map_of(env, table)
-    figure, axis = _panel(layout) if ax is None else (ax.get_figure(root=True), ax)
+    figure, axis = _panel(layout) if ax is None else (_figure_of(ax), ax)
     draw = {"reward": _reward, "policy": _policy, "values": _values, "occupancy": _occupancy}[found]
     said = draw(axis, values, table, layout, Names.of(env, table.states, None if env.spec is None else env.spec.id))
     axis.set_title(said if title is None else title, fontsize=10 if layout is None else None)
@@ -84,11 +84,18 @@ def _panel(layout: GridLayout | None) -> tuple[Figure, Axes]:
 
 def _fit_texts(axis: Axes, layout: GridLayout) -> None:
     """Make the texts of a map as much smaller as its panel is than one of its own; none where they could not be read."""
-    inches = axis.get_window_extent().size / axis.get_figure(root=True).dpi
-    share = min(1.0, float((inches / layout.shape[::-1]).min()) / drawing.cell_inches(layout))
+    box, dots = axis.get_window_extent(), _figure_of(axis).dpi
+    cell = min(box.height / layout.shape[0], box.width / layout.shape[1]) / dots
+    share = min(1.0, cell / drawing.cell_inches(layout))
     for text in axis.texts:
-        text.set_fontsize(share * text.get_fontsize())
-        text.set_visible(text.get_fontsize() >= LEAST_POINTS)
+        size = share * float(text.get_fontsize())
+        text.set_fontsize(size)
+        text.set_visible(size >= LEAST_POINTS)
+
+
+def _figure_of(axis: Axes) -> Figure:
+    figure: Any = axis.get_figure(root=True)
+    return figure
 
 
 def _told(what: Any, kind: Kind | None, table: Tabulation) -> tuple[Kind, np.ndarray]:

@@ -10,7 +10,8 @@
     TrajectoryLP(phi).fit(Simulator(env, planner, gamma), episodes)     from the expert's episodes alone
     worst_tie(mdp, learned, true)             what the worst policy that is greedy under the learned reward earns
     doctor(result, mdp, expert)               why a reward came out zero, flat or useless, in sentences, each with a mend
-    LearnedReward(env, reward)                the environment, paying the learned reward
+    LearnedReward(env, result, shaping=table) the environment, paying the learned reward so that agents learn it
+    plot(result, env)                         a picture of a reward, a policy or values, on the environment's map
     TabularEnv, TabularVecEnv                 a table as an environment, or as thousands of copies for Stable-Baselines3
     SB3("PPO").plan(env, gamma=...)           an agent trained on it; ValueIteration().plan(...) plans exactly
     collect, write_minari, read_minari        demonstrations
@@ -23,4 +24,14 @@ IrlGymError. The names below are imported when first used; `import irl_gym` itse
 import lazy_loader
 
 __version__ = "0.1.0"
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str):
+    if name in __all__ or name.startswith("_"):
+        return _found(name)
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), by_lower := {one.lower(): one for one in __all__}, n=1)
+    mend = f" Use irl_gym.{by_lower[near[0]]}." if near else " `help(irl_gym)` lists them."
+    raise AttributeError(f"irl_gym has no {name}: expected one of its names.{mend}")

@@ -22,12 +22,13 @@ from .mdp.episodes import collect as collect
 from .mdp.episodes import empirical_policy as empirical_policy
 from .mdp.optimality import Optimality as Optimality
 from .mdp.optimality import certify as certify
-from .mdp.planning.dynamic_programming import evaluate_policy as evaluate_policy
+from .mdp.planning.dynamic_programming import policy_evaluation as policy_evaluation
 from .mdp.planning.dynamic_programming import policy_iteration as policy_iteration
 from .mdp.planning.dynamic_programming import value_iteration as value_iteration
 from .mdp.policies import TabularPolicy as TabularPolicy
 from .mdp.rewards import TabularReward as TabularReward
 from .mdp.tabular_mdp import TabularMDP as TabularMDP
+from .reports.plot import plot as plot
 from .runs.experiment import Experiment as Experiment
 from .tables.discretize import discretize as discretize
 from .tables.tabulate import tabulate as tabulate

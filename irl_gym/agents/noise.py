@@ -18,7 +18,7 @@ import numpy as np
 from irl_gym._typing import Actions, ActionSets, Matrix
 from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidParameter, InvalidPolicy
-from irl_gym.mdp.planning.dynamic_programming import Reward, backup, checked_reward, evaluate_policy, tied
+from irl_gym.mdp.planning.dynamic_programming import Reward, backup, checked_reward, policy_evaluation, tied
 from irl_gym.mdp.policies import NOISE, Policy, as_distribution, generator
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
@@ -92,7 +92,7 @@ def boltzmann_expert(mdp: TabularMDP, R: Reward, policy: Actions | Matrix | Acti
         InvalidParameter: a temperature that is negative or NaN.
     """
     temperature = checked_temperature(temperature)
-    V = evaluate_policy(mdp, R, policy)
+    V = policy_evaluation(mdp, R, policy)
     return boltzmann(backup(mdp, checked_reward(mdp, R), V), temperature)
 
 

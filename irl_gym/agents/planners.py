@@ -34,6 +34,7 @@ from irl_gym.files.own_files import write_bytes
 from irl_gym.mdp.planning.dynamic_programming import value_iteration
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount
+from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.tabulate import tabulate
 
@@ -71,7 +72,7 @@ class Planner(Protocol):
 
 
 @dataclass(frozen=True)
-class ValueIteration:
+class ValueIteration(Record):
     """Exact planning on the table of the environment."""
 
     tolerance: float | None = None
@@ -102,7 +103,7 @@ class ValueIteration:
 
 
 @dataclass(frozen=True, eq=False)
-class Agent:
+class Agent(Record):
     """A trained Stable-Baselines3 model, as a policy."""
 
     model: BaseAlgorithm
@@ -179,7 +180,7 @@ def _algorithm(name: str) -> type[BaseAlgorithm]:
 
 
 @dataclass(frozen=True)
-class SB3:
+class SB3(Record):
     """Reinforcement learning with Stable-Baselines3.
 
     Raises:

@@ -27,6 +27,7 @@ from irl_gym.mdp.policies import Policy, generator
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.programs.killable import check_limit
+from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_size
 from irl_gym.tables.tabulate import tabulate
 from irl_gym.tables.tabulation import Tabulation
@@ -36,7 +37,7 @@ MOST_TABLED = 1 << 25
 
 
 @dataclass(frozen=True, eq=False)
-class Simulator:
+class Simulator(Record):
     """An environment, who solves it for a reward, and a discount.
 
     Raises:

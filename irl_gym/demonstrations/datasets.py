@@ -17,8 +17,9 @@ from gymnasium import spaces
 from minari.storage.datasets_root_dir import get_dataset_path
 
 from irl_gym.demonstrations.choices import AfterEnd
-from irl_gym.demonstrations.dataset_files import check_episode, check_episodes, check_told
-from irl_gym.demonstrations.endings import checked_after_end, episode_of
+from irl_gym.demonstrations.dataset_files import check_told
+from irl_gym.demonstrations.endings import checked_after_end
+from irl_gym.demonstrations.minari_episodes import MinariEpisodes, broken
 from irl_gym.demonstrations.minari_files import Description, check_free, check_id, identity, publish, told, write_files
 from irl_gym.demonstrations.minari_formats import DataFormat
 from irl_gym.errors import (
@@ -173,7 +174,7 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
             check_told(base / dataset_id / "data")
             return minari.load_dataset(dataset_id)
         except BROKEN as error:
-            raise _broken(dataset_id, error) from error
+            raise broken(dataset_id, error) from error
 
 
 def _ids(base: Path) -> list[str]:
@@ -195,8 +196,8 @@ def read_minari(
     env: gym.Env | None = None,
     root: str | os.PathLike | None = None,
     after_end: AfterEnd = "refuse",
-) -> Iterator[Episode]:
-    """Read the episodes of a Minari dataset with discrete actions, one at a time.
+) -> MinariEpisodes:
+    """The episodes of a Minari dataset with discrete actions: a sequence that reads one at a time, whenever it is asked for.
 
     Args:
         dataset: a dataset, or the id of one under `root`.
@@ -211,8 +212,8 @@ def read_minari(
         FileNotFoundError: no dataset of that id.
         NotDiscrete: continuous actions.
         DatasetMismatch: recorded in another environment, or one with other observations.
-        InvalidDemonstrations: no episode, one without steps or that goes on after its end, a reward that is not finite, or a
-            file that cannot be read.
+        InvalidDemonstrations: no episode. When they are read: one without steps or that goes on after its end, a reward that
+            is not finite, or a file that cannot be read.
         InvalidParameter: another word for `after_end`.
     """
     checked_after_end(after_end)
@@ -237,30 +238,7 @@ def read_minari(
         raise InvalidDemonstrations(
             f"dataset {dataset.spec.dataset_id!r} has no episodes: expected at least one. Record some, or name another."
         )
-    first = int(actions.start)
-    for episode, metadata in _stored(dataset):
-        here = f"dataset {dataset.spec.dataset_id!r}, episode {episode.id}"
-        yield episode_of(here, episode, metadata, first, after_end)
-
-
-def _stored(dataset: minari.MinariDataset) -> Iterator[tuple[Any, Any]]:
-    """Episodes and their metadata, as Minari gives them, once their files are known to be sound."""
-    try:
-        check_episodes(Path(dataset.storage.data_path), dataset.storage.FORMAT, map(int, dataset.episode_indices))
-        metadatas = dataset.storage.get_episode_metadata(dataset.episode_indices)
-        for episode, metadata in zip(dataset.iterate_episodes(), metadatas, strict=True):
-            check_episode(episode, metadata, dataset.spec.observation_space, dataset.spec.action_space)
-            yield episode, metadata
-    except BROKEN as error:
-        raise _broken(dataset.spec.dataset_id, error) from error
-
-
-def _broken(dataset_id: str, error: Exception) -> InvalidDemonstrations:
-    reason = " ".join(str(error).split())
-    return InvalidDemonstrations(
-        f"dataset {dataset_id!r} cannot be read ({type(error).__name__}: {reason}): expected a whole Minari dataset. Copy or "
-        "download it again, or record it anew under another id."
-    )
+    return MinariEpisodes(dataset, dataset.episode_indices, after_end)
 
 
 def _check_recorded(dataset: minari.MinariDataset, env: gym.Env) -> None:

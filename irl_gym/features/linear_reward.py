@@ -23,6 +23,8 @@ from irl_gym.features.feature_maps import (
     over_rows,
 )
 from irl_gym.mdp.rewards import TabularReward, read_archive, write_archive
+from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_size, take
 from irl_gym.spaces.states import States
 
@@ -31,7 +33,7 @@ _KINDS = {kind.__name__: kind for kind in (OneHot, Table, RadialBasis, Fourier, 
 
 
 @dataclass(frozen=True, eq=False)
-class LinearReward:
+class LinearReward(Record):
     """R(s) = alpha . phi(s), paid on arrival. Immutable.
 
     Raises:
@@ -142,6 +144,17 @@ def load_reward(path: str | os.PathLike) -> TabularReward | LinearReward:
     """
     header, _ = read_archive(path, (FORMAT, *TabularReward.FORMATS))
     return LinearReward.load(path) if header["format"] == FORMAT else TabularReward.load(Path(path))
+
+
+def load_payment(path: str | os.PathLike) -> TabularReward | LinearReward | ShapedReward:
+    """Read what an agent can be paid: a reward of either kind, or a shaped one.
+
+    Raises:
+        FileNotFoundError: no such file.
+        InvalidReward: the file holds none.
+    """
+    header, _ = read_archive(path, (FORMAT, *TabularReward.FORMATS, *ShapedReward.FORMATS))
+    return ShapedReward.load(path) if header["format"] in ShapedReward.FORMATS else load_reward(path)
 
 
 def _rows(rows: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from scipy.stats import norm
 
 from irl_gym.intervals import LEVEL, Interval, mean_interval
 from irl_gym.mdp.episodes import Episode
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, occupancy, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import occupancy, policy_evaluation, policy_iteration
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.sampling_error import spread_of
 from irl_gym.tables.tabulation import Tabulation
@@ -66,7 +66,7 @@ def counting_error(table: Tabulation, policy: np.ndarray) -> float:
     """
     mdp, payments = table.mdp, table.payments
     assert mdp.visits is not None
-    V = evaluate_policy(mdp, table.reward, as_distribution(policy, mdp.n_states, mdp.n_actions))
+    V = policy_evaluation(mdp, table.reward, as_distribution(policy, mdp.n_states, mdp.n_actions))
     if payments.entries is None:
         spread = payments.deviation.ravel() + mdp.gamma * spread_of(mdp, V)
     else:

@@ -18,6 +18,7 @@ from irl_gym.checks import LARGEST
 from irl_gym.files.own_files import write_bytes
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp.sampling import Successors
+from irl_gym.records import Record
 from irl_gym.tables.tabulation import Tabulation
 
 EPISODES = 100
@@ -29,7 +30,7 @@ COLUMNS = ("environment_steps", "true_value", "mean_return", "return_low", "retu
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Record):
     """A learning curve."""
 
     steps: np.ndarray

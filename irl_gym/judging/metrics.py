@@ -12,18 +12,19 @@ import numpy as np
 from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import InvalidParameter
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, occupancy, optimum, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import occupancy, optimum, policy_evaluation, policy_iteration
 from irl_gym.mdp.planning.howard import OUTWARDS, Optimum
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import not_told
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
+from irl_gym.records import Record
 
 TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, eq=False)
-class Ties:
+class Ties(Record):
     """Which actions are as good as the best: decided by bounds of their values, rounding included."""
 
     tied: ActionSets
@@ -39,7 +40,7 @@ class Ties:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class Agreement(Record):
     """How often a policy does what a reward asks for, over the reachable states that are not terminal."""
 
     share: float
@@ -49,7 +50,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class Tie(Record):
     """A policy among those greedy under a learned reward: the worst or the best of them under the true one."""
 
     policy: np.ndarray
@@ -63,7 +64,7 @@ class Tie:
 
 
 @dataclass(frozen=True, eq=False)
-class Regret:
+class Regret(Record):
     """What a policy loses against an optimal one, in discounted value under the true reward."""
 
     value: float
@@ -90,7 +91,7 @@ def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: An
         InvalidParameter: a horizon that is not a whole number of at least 0.
     """
     if horizon is None:
-        return float(checked_mdp(mdp).d0 @ evaluate_policy(mdp, as_reward(reward), policy))
+        return float(checked_mdp(mdp).d0 @ policy_evaluation(mdp, as_reward(reward), policy))
     steps = int(checked_number("horizon", horizon, "a whole number of steps of at least 0, or None", least=0, whole=True))
     mixing = checked_mdp(mdp).mixing(policy)
     P_pi, R_pi = mixing @ mdp.P, mixing @ as_reward(reward).expected(mdp).ravel()

@@ -15,6 +15,7 @@ from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.programs.solvers import Status, check_solving
+from irl_gym.records import Record
 
 
 @runtime_checkable
@@ -40,7 +41,7 @@ AnyProof = TypeVar("AnyProof", bound=Proof)
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome(Generic[AnyReward, AnyProof]):
+class Outcome(Record, Generic[AnyReward, AnyProof]):
     """What was learned, a reward or a policy or both, and what the learner proves of it.
 
     Raises:

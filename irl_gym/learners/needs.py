@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 
 from irl_gym.errors import InvalidParameter, MissingPart
 from irl_gym.learners.problem import Problem
+from irl_gym.records import Record
 
 Column = Literal["passive", "active", "interactive"]
 Part = Literal[
@@ -39,7 +40,7 @@ TO_GET = {
 
 
 @dataclass(frozen=True)
-class Needs:
+class Needs(Record):
     """The parts of a `Problem` that a learner reads; what is not named here it does not look at.
 
     Raises:

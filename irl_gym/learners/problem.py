@@ -31,6 +31,7 @@ from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
 from irl_gym.mdp.policies import Policy, as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount
+from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.tabulation import Tabulation
 
@@ -78,7 +79,7 @@ class Oracle:
 
 
 @dataclass(frozen=True)
-class Spaces:
+class Spaces(Record):
     """How observations and actions are numbered."""
 
     observations: spaces.Space
@@ -90,7 +91,7 @@ class Spaces:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Record):
     """What is known of an expert and a world.
 
     Raises:

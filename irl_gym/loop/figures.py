@@ -15,14 +15,13 @@ from irl_gym.judging.curves import Curve
 from irl_gym.judging.metrics import optimal_actions
 from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import Episode, seen_parts
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.reports import plotting
 from irl_gym.reports.cell_maps import draw_actions, draw_planes
-from irl_gym.spaces.listed_states import usual_observation
-from irl_gym.spaces.names import Names, action_names, state_name
+from irl_gym.spaces.names import Names
 from irl_gym.tables.cells import Cells
 from irl_gym.tables.layouts import GridLayout
 from irl_gym.tables.tabulation import Tabulation
@@ -45,9 +44,7 @@ def of_table(
     env: gym.Env, env_id: str | None,
 ) -> dict[str, Any]:  # fmt: skip
     """Rewards, values and policies state by state."""
-    usual = usual_observation(table.states)
-    names = Names(action_names(env), lambda row: state_name(env_id, table.states.decode(row), None, usual))
-    return _kept(folder, _pictures(table, tabular, expert, agent, layout, names))
+    return _kept(folder, _pictures(table, tabular, expert, agent, layout, Names.of(env, table.states, env_id)))
 
 
 def _kept(folder: Path, pictures: Mapping[str, plotting.Figure]) -> dict[str, Any]:
@@ -69,7 +66,7 @@ def _pictures(
         taken = (expert > 0) & known[:, None]
     else:
         taken = as_distribution(expert, mdp.n_states, mdp.n_actions) > 0
-    values = [evaluate_policy(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
+    values = [policy_evaluation(mdp, reward.expected(mdp), expert) for reward in (true, learned)]
     values = [np.where(unknown & ~mdp.terminal, np.nan, V) for V in values]  # nothing is known of the expert there
     if isinstance(table.states, Cells) and len(table.states.shape) == 2:
         told = np.where(taken.any(axis=1), expert.argmax(axis=1) if expert.ndim == 2 else expert, np.nan)

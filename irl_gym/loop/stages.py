@@ -35,14 +35,15 @@ from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.runs.certificates import certificate_of, facts_in
 from irl_gym.runs.experiment import class_name
 from irl_gym.runs.logs import log_scalars, logged
 from irl_gym.runs.scorecard import came_about, how_of, outcome_of, scorecard
 from irl_gym.tables.tabulation import Tabulation
 
-REWARD = "reward.npz"
-"""Where the recovered reward is kept."""
+REWARD, SHAPED = "reward.npz", "reward_shaped.npz"
+"""Where the recovered reward is kept; and, of a table, what an agent of anybody's own is paid (`LearnedReward(env, file)`)."""
 OnProgress = Callable[[str, float | None, str], None]
 """Called with a stage, the share of it that is done, from 0 to 1, None where that cannot be known, and what else is known."""
 
@@ -129,6 +130,9 @@ def learned_outcome(
     record["policy"] = outcome.policy is not None
     _check_kept(learner, certificate, record)
     write_json(folder / "certificate.json", certificate)
+    if table is not None and outcome.reward is not None:
+        tabular = outcome.reward.tabular(table.states)
+        ShapedReward.of(tabular, table.mdp, certificate["proof"]["terms"].get("margin_cap") or None).save(folder / SHAPED)
     if problem.environment is not None:
         record["stats"]["exact_planner"] = bool(getattr(problem.environment, "exact", False))
     return record

@@ -25,10 +25,10 @@ from irl_gym.judging.curves import EPISODES, sampled_returns, two_returns
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, collect, collect_from_table, empirical_policy
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, load_actions
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.shaping import ExpectedAdvantage, typical_loss
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
-from irl_gym.spaces.states import StateIndex, States
-from irl_gym.tables.layouts import GridLayout, grid_layout
+from irl_gym.spaces.states import States
+from irl_gym.tables.layouts import GridLayout, map_of
 from irl_gym.tables.table_files import keep_table
 from irl_gym.tables.tabulation import Tabulation
 
@@ -85,8 +85,7 @@ class TableWorld:
     @property
     def layout(self) -> GridLayout | None:
         """The map, where the table is exact and its rows are the cells; not where only some cells are listed."""
-        exact = self.table.evidence.exact and isinstance(self.states, StateIndex)
-        return grid_layout(self.env, self.mdp) if exact else None
+        return map_of(self.env, self.table)
 
     @property
     def random(self) -> np.ndarray:
@@ -123,7 +122,7 @@ class TableWorld:
         plain = self.tabular(reward)
         if not shaped:
             return plain
-        return ExpectedAdvantage(margin_cap or typical_loss(plain, self.mdp)).apply(plain, self.mdp)
+        return ShapedReward.of(plain, self.mdp, margin_cap or None).paid
 
     def pays(
         self,

@@ -14,10 +14,11 @@ import numpy as np
 
 from irl_gym._typing import Matrix, StateMask
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidDemonstrations, UnknownObservation
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, InvalidPolicy, UnknownObservation
 from irl_gym.mdp.policies import Policy, as_distribution
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
 
@@ -25,7 +26,7 @@ Ending = Literal["seen", "unseen", "followed", "dropped"]
 
 
 @dataclass(frozen=True, eq=False)
-class Episode:
+class Episode(Record):
     """One episode.
 
     Raises:
@@ -142,9 +143,18 @@ def collect(
             end one.
 
     Raises:
-        InvalidParameter: fewer than 1 episodes or steps.
+        InvalidParameter: fewer than 1 episodes or steps, or no environment.
+        InvalidPolicy: a policy without `predict`.
     """
     _check_count(n_episodes, max_episode_steps)
+    if not hasattr(env, "reset"):
+        raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment. It comes first, then the policy.")
+    if not hasattr(policy, "predict"):
+        raise InvalidPolicy(
+            f"policy is a {type(policy).__name__}: expected one that acts on observations, with `predict`. Make one of a "
+            "table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), "
+            "table.states)`."
+        )
     return _stepped(env, policy, n_episodes, seed, deterministic, max_episode_steps)
 
 
@@ -233,7 +243,7 @@ def _drawn(
 
 
 @dataclass(frozen=True, eq=False)
-class EmpiricalPolicy:
+class EmpiricalPolicy(Record):
     """What episodes say about the policy that made them, and where they say nothing."""
 
     counts: np.ndarray
@@ -255,9 +265,13 @@ def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int
     """Count the actions taken in each state.
 
     Raises:
+        InvalidParameter: states or a number of actions that are none.
         InvalidDemonstrations: an action out of range, naming episode and step; or no episode.
         UnknownObservation: an observation that the index does not hold, naming the episode.
     """
+    if not isinstance(states, States):
+        raise InvalidParameter(f"states is a {type(states).__name__}: expected a numbering. Give a table's, `table.states`.")
+    checked_number("n_actions", n_actions, "a whole number of at least 1, such as `table.mdp.n_actions`", least=1, whole=True)
     counts = np.zeros((states.n_states, n_actions), dtype=np.int64)
     number = -1
     for number, episode in enumerate(episodes):

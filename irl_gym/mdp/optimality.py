@@ -28,13 +28,14 @@ from irl_gym.mdp.policies import as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.sampling_error import counted_table
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
+from irl_gym.records import Record
 
 ROUNDING = 1e-9
 """Share of the largest |R| up to which rewards are the same."""
 
 
 @dataclass(frozen=True, eq=False)
-class Optimality:
+class Optimality(Record):
     """What a reward says of an expert. States that cannot be reached from d0 are not judged."""
 
     expert_optimal: bool | None

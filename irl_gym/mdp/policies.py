@@ -8,6 +8,7 @@ Axes: S states, A actions.
 """
 
 import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -17,6 +18,7 @@ from irl_gym._typing import ActionSets, Matrix
 from irl_gym.checks import any_array, checked_number, of_single_precision, shown_sum
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
 from irl_gym.files.archives import read_arrays
+from irl_gym.records import Record
 from irl_gym.spaces.states import States
 
 ACTIONS = 1
@@ -76,7 +78,7 @@ def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
     """
     array = policy_array(expert)
     if array.dtype.kind != "f" or array.ndim != 2 or len(array) != n_states:
-        return expert, np.ones(n_states, dtype=bool)
+        return array, np.ones(n_states, dtype=bool)
     unknown = np.asarray(np.isnan(array).all(axis=1))
     if unknown.all():
         raise InvalidPolicy("nothing is known of the expert in any state: expected probabilities in at least one.")
@@ -84,14 +86,40 @@ def completed(expert: Any, n_states: int) -> tuple[Any, np.ndarray]:
 
 
 def policy_array(policy: Any) -> np.ndarray:
-    """A policy as an array: that of a TabularPolicy, or what was given.
+    """A policy as an array: that of a TabularPolicy, or of what holds one, such as a Solution; or what was given.
 
     Raises:
-        InvalidPolicy: rows of several lengths.
+        InvalidPolicy: rows of several lengths, or what is no table: episodes, or what acts on observations.
     """
     if isinstance(policy, TabularPolicy):
         return policy.probabilities
-    return any_array("policy", policy, "one entry for each state", InvalidPolicy)
+    held = getattr(policy, "policy", None)
+    if isinstance(held, np.ndarray | TabularPolicy):
+        return policy_array(held)
+    first = policy[0] if isinstance(policy, Sequence) and len(policy) else None
+    episodes = hasattr(first, "observations")
+    array = None if episodes else any_array("policy", policy, "one entry for each state", InvalidPolicy)
+    if array is None or array.dtype == object:
+        raise InvalidPolicy(
+            f"policy is a {type(policy).__name__}{' of episodes' * episodes}: expected a table, (S,) actions or (S, A) "
+            f"probabilities. {_table_of(policy, first)}"
+        )
+    return array
+
+
+def _table_of(policy: Any, first: Any) -> str:
+    """How to make a table of what is none."""
+    states = "table.states, table.mdp.n_actions"
+    most = "irl_gym.demonstrations.demonstrated.most_frequent"
+    if hasattr(policy, "predict"):
+        return "Ask it in each state, with `irl_gym.agents.planners.tabular_actions(policy, table.states)`."
+    if hasattr(policy, "counts"):
+        return f"Take what it does most, with `{most}(policy)`."
+    if hasattr(first, "observations") or isinstance(policy, Iterator):
+        return f"Count what episodes show, with `{most}(irl_gym.empirical_policy(episodes, {states}))`."
+    if hasattr(policy, "P"):
+        return "The mdp comes first, then the expert."
+    return "Give one entry for each state."
 
 
 def _one_hot(actions: np.ndarray, n_actions: int) -> np.ndarray:
@@ -177,7 +205,7 @@ def generator(seed: int, stream: int = ACTIONS) -> np.random.Generator:
 
 
 @dataclass(frozen=True, eq=False)
-class TabularPolicy:
+class TabularPolicy(Record):
     """A table of action probabilities that acts on observations, with Stable-Baselines3's `predict`."""
 
     probabilities: Matrix

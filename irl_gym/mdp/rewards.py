@@ -18,7 +18,8 @@ from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import DamagedFile, InvalidReward
 from irl_gym.files.archives import json_in, read_arrays
 from irl_gym.files.own_files import write_arrays
-from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.mdp.tabular_mdp import TransitionTable, checked_mdp
+from irl_gym.records import Record
 
 FORMAT = "irl_gym.TabularReward/1"
 SOLVED_WITHIN = 1e-6
@@ -35,7 +36,7 @@ class RewardFunction(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class TabularReward:
+class TabularReward(Record):
     """A reward in a table: (S,) paid on arrival, or (S, A) paid for the step. Immutable.
 
     Raises:
@@ -115,6 +116,8 @@ class TabularReward:
         Raises:
             InvalidReward: a reward for another number of states or actions.
         """
+        if not isinstance(table, TransitionTable):
+            checked_mdp(table)  # refuses what only holds one
         shape = (table.n_states, table.n_actions)
         if self.values.shape != shape[: self.values.ndim]:
             raise InvalidReward(
@@ -210,8 +213,9 @@ def as_reward(reward: Any) -> TabularReward:
     """A TabularReward as it is, or one made of an array (S,) or (S, A).
 
     Raises:
-        InvalidReward: an array of another shape, or with values that are not finite.
+        InvalidReward: an array of another shape, or with values that are not finite; or what only holds a reward.
     """
+    check_reward_itself(reward)
     return reward if isinstance(reward, TabularReward) else TabularReward(reward)
 
 
@@ -226,6 +230,16 @@ def in_table(reward: Any, states: Any) -> TabularReward:
         InvalidReward: an array of another shape, or with values that are not finite.
     """
     return reward.tabular(states) if hasattr(reward, "tabular") else as_reward(reward)
+
+
+def check_reward_itself(reward: Any) -> None:
+    """Check that this is no outcome or table, which hold a reward.
+
+    Raises:
+        InvalidReward: it is.
+    """
+    if hasattr(reward, "reward"):
+        raise InvalidReward(f"the reward is a {type(reward).__name__}: expected the reward that it holds. Give its `reward`.")
 
 
 def plain_json(value: Any) -> Any:

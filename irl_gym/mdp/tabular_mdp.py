@@ -170,7 +170,10 @@ def checked_mdp(mdp: Any) -> TabularMDP:
     """
     if isinstance(mdp, TabularMDP):
         return mdp
-    raise InvalidMDP(f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`.")
+    mend = "Give its `mdp`." if hasattr(mdp, "mdp") else "The mdp comes first, then the expert." if np.ndim(mdp) else ""
+    raise InvalidMDP(
+        f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`. {mend}".strip()
+    )
 
 
 def check_discount(gamma: float) -> float:

@@ -31,25 +31,37 @@ def draw_planes(cells: Cells, table: TransitionTable, panels: Mapping[str, np.nd
     """
     figure = drawing.blank(5.6 * len(panels), 4.4)
     for axis, (title, values) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items(), strict=True):
-        shown = _plane(cells, table, values)
-        largest = float(np.abs(shown).max()) or 1.0
-        norm = CenteredNorm(0, halfrange=largest) if centred else Normalize(float(shown.min()), float(shown.max()))
-        mappable = _show(axis, cells, shown, cmap="RdBu" if centred else "viridis", norm=norm)
-        figure.colorbar(mappable, ax=axis, label=label, aspect=25, pad=0.02)
+        plane(axis, cells, table, values, label=label, centred=centred)
         axis.set_title(title)
     return figure
+
+
+def plane(axis: Axes, cells: Cells, table: TransitionTable, values: np.ndarray, *, label: str, centred: bool) -> None:
+    """Values (S,) in one panel; the rest as of `draw_planes`."""
+    shown = _plane(cells, table, values)
+    largest = float(np.abs(shown).max()) or 1.0
+    norm = CenteredNorm(0, halfrange=largest) if centred else Normalize(float(shown.min()), float(shown.max()))
+    mappable = _show(axis, cells, shown, cmap="RdBu" if centred else "viridis", norm=norm)
+    axis.figure.colorbar(mappable, ax=axis, label=label, aspect=25, pad=0.02)
 
 
 def draw_actions(cells: Cells, table: TransitionTable, panels: Mapping[str, np.ndarray], n_actions: int) -> Figure:
     """Policies side by side; panels are (S,) actions by title."""
     figure = drawing.blank(5.2 * len(panels), 4.8)
-    colours = [ACTIONS[a % len(ACTIONS)] for a in range(n_actions)]
     for axis, (title, actions) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items(), strict=True):
-        _show(axis, cells, _plane(cells, table, actions), cmap=ListedColormap(colours), norm=Normalize(-0.5, n_actions - 0.5))
+        handles = plane_of_actions(axis, cells, table, actions, tuple(f"action {a}" for a in range(n_actions)))
         axis.set_title(title)
-    handles = [Patch(color=colour, label=f"action {a}") for a, colour in enumerate(colours)]
     figure.legend(handles=handles, frameon=False, loc="outside lower center", ncols=min(n_actions, 6))
     return figure
+
+
+def plane_of_actions(
+    axis: Axes, cells: Cells, table: TransitionTable, actions: np.ndarray, names: tuple[str, ...]
+) -> list[Patch]:
+    """Actions (S,) in one panel, NaN where nothing is known; returns what a legend says of the colours."""
+    colours = [ACTIONS[a % len(ACTIONS)] for a in range(len(names))]
+    _show(axis, cells, _plane(cells, table, actions), cmap=ListedColormap(colours), norm=Normalize(-0.5, len(names) - 0.5))
+    return [Patch(color=colour, label=name) for colour, name in zip(colours, names, strict=True)]
 
 
 def _plane(cells: Cells, table: TransitionTable, values: np.ndarray) -> np.ma.MaskedArray:

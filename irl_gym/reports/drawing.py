@@ -4,6 +4,7 @@ Colours are Okabe & Ito's. A cell that no episode visits is slate; letters are t
 Axes: S states, A actions.
 """
 
+import io
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -32,9 +33,18 @@ ENDS = {"G": "#bfe8d8", "H": "#33363d", "E": "#d8d9dc"}
 MEANINGS = {"S": "start", "G": "goal", "H": "hole or pit", "E": "end of the episode"}
 
 
+class _Picture(Figure):
+    """A figure that notebooks show, whether or not pyplot was imported."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png", dpi=100)
+        return content.getvalue()
+
+
 def blank(width: float, height: float) -> Figure:
     """A figure without pyplot; width and height in inches."""
-    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    figure = _Picture(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -45,7 +55,7 @@ def panels(layout: GridLayout | None) -> tuple[Figure, Sequence[Axes]]:
         figure = blank(11, 4.4)
         return figure, tuple(figure.subplots(1, 2))
     rows, columns = layout.shape
-    cell = _cell_inches(layout)
+    cell = cell_inches(layout)
     if columns > 2 * rows:
         figure = blank(max(columns * cell + 1.6, 5.5), 2 * (rows * cell + 1.05))
         return figure, tuple(figure.subplots(2, 1))
@@ -127,9 +137,9 @@ def triangles(axis: Axes, layout: GridLayout, R: np.ndarray) -> str:
         corners = np.stack([np.zeros(2), along + across, along - across])
         paid = layout.cells(R)[shown][:, a]
         shape = PolyCollection(list(centres[:, None] + corners), facecolors=mappable.to_rgba(paid), linewidths=0.4)
-        shape.set_edgecolor("#e2e3e6" if _cell_inches(layout) > 0.2 else "none")
+        shape.set_edgecolor("#e2e3e6" if cell_inches(layout) > 0.2 else "none")
         axis.add_collection(shape)
-        for (x, y), value in zip(centres, paid, strict=True) if _cell_inches(layout) >= 0.7 else ():
+        for (x, y), value in zip(centres, paid, strict=True) if cell_inches(layout) >= 0.7 else ():
             ink = _ink(np.asarray(mappable.to_rgba(value)[:3]))
             spot = np.array([x, y]) + 0.54 * along
             axis.text(spot[0], spot[1], written(value), ha="center", va="center", color=ink, fontsize=_size(layout, 0.13))
@@ -223,14 +233,15 @@ def plain(axis: Axes) -> None:
     axis.set_axisbelow(True)
 
 
-def _cell_inches(layout: GridLayout) -> float:
+def cell_inches(layout: GridLayout) -> float:
+    """The side of a cell."""
     rows, columns = layout.shape
     return float(np.clip((9.0 if columns > 2 * rows else 4.8) / max(rows, columns), 0.004, 1.0))
 
 
 def _size(layout: GridLayout, share: float) -> float:
     """Font size, in points, of text as high as a share of a cell."""
-    return float(np.clip(72 * share * _cell_inches(layout), 4.5, 11))
+    return float(np.clip(72 * share * cell_inches(layout), 4.5, 11))
 
 
 def _stride(layout: GridLayout) -> int:

@@ -24,13 +24,14 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.files.own_files import whole
 from irl_gym.mdp.arrival_rewards import paid_on_arrival
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
 from irl_gym.reports import drawing
 from irl_gym.spaces.names import Names
 from irl_gym.tables.layouts import GridLayout
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnCurve:
+class DrawnCurve(Record):
     """A learning curve."""
 
     steps: np.ndarray
@@ -66,21 +67,24 @@ def draw_rewards(
     if layout is None:
         figure, above, below = drawing.paired_panels()
         for sorted_, named, name, R in zip(above, below, ("True reward", "Learned reward"), (true, learned), strict=True):
-            _draw_sorted_reward(sorted_, named, name, R, table, names or Names.numbered(table.n_actions))
+            draw_sorted_reward(sorted_, named, name, R, table, names or Names.numbered(table.n_actions))
         drawing.small_titles(figure)
         return figure
     figure, axes = drawing.panels(layout)
     for axis, name, R in ((axes[0], "True reward", true), (axes[1], "Learned reward", learned)):
-        on_states = R if R.ndim == 1 else paid_on_arrival(R, table)
-        if on_states is None:
-            told = drawing.triangles(axis, layout, R)
-        else:
-            norm = CenteredNorm(0, halfrange=max(float(np.abs(on_states[table.reachable]).max()), 1e-9))
-            drawing.cells(axis, layout, on_states, cmap="RdBu", norm=norm, label="reward on arrival")
-            told = "paid on arrival in a cell"
-        axis.set_title(f"{name}, {told}")
+        axis.set_title(f"{name}, {reward_map(axis, layout, R, table)}")
     drawing.footnote(figure, layout)
     return figure
+
+
+def reward_map(axis: Axes, layout: GridLayout, R: np.ndarray, table: TransitionTable) -> str:
+    """A reward (S,) or (S, A) on one map; returns what was drawn, for the title."""
+    on_states = R if R.ndim == 1 else paid_on_arrival(R, table)
+    if on_states is None:
+        return drawing.triangles(axis, layout, R)
+    norm = CenteredNorm(0, halfrange=max(float(np.abs(on_states[table.reachable]).max()), 1e-9))
+    drawing.cells(axis, layout, on_states, cmap="RdBu", norm=norm, label="reward on arrival")
+    return "paid on arrival in a cell"
 
 
 def draw_values(
@@ -108,7 +112,7 @@ def draw_values(
         for axis, kind, V in ((below[0], "true", true_values), (below[1], "learned", learned_values)):
             entries = drawing.telling(V[judged], lambda i: called.state(int(rows[i])))
             drawing.named_bars(axis, entries)
-            axis.set(title=_of_all(f"Value, {kind} reward", len(entries), rows.size, "states"), xlabel="discounted value")
+            axis.set(title=of_all(f"Value, {kind} reward", len(entries), rows.size, "states"), xlabel="discounted value")
         axes[1].scatter(true_values[judged], learned_values[judged], s=14, color=drawing.BLUE, alpha=0.55, linewidths=0)
         axes[1].set(
             title="The same states under the learned reward",
@@ -253,8 +257,10 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
         figure.savefig(file, format=kind, dpi=130, metadata=blank[kind])
 
 
-def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, table: TransitionTable, names: Names) -> None:
-    """A reward where there is no map: every state or step, best first; and below it the first and the last by name."""
+def draw_sorted_reward(
+    sorted_: Axes | None, named: Axes, name: str, R: np.ndarray, table: TransitionTable, names: Names
+) -> None:
+    """A reward where there is no map: every state or step, best first; and the first and the last by name."""
     if R.ndim == 1:
         where, what, told = np.flatnonzero(table.reachable)[:, None], "states", "paid on arrival in a state"
     else:
@@ -262,8 +268,9 @@ def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, ta
         pairs = np.meshgrid(acting, np.arange(table.n_actions), indexing="ij")
         where, what, told = np.stack(pairs, axis=-1).reshape(-1, 2), "steps (s, a)", "expected for a step"
     values = R[tuple(where.T)]
-    drawing.sorted_line(sorted_, values)
-    sorted_.set(title=f"{name}, {told}", xlabel=f"{values.size:,} {what}, best first", ylabel="reward")
+    if sorted_ is not None:
+        drawing.sorted_line(sorted_, values)
+        sorted_.set(title=f"{name}, {told}", xlabel=f"{values.size:,} {what}, best first", ylabel="reward")
 
     def called(i: int) -> str:
         state, *action = where[i].tolist()
@@ -271,9 +278,9 @@ def _draw_sorted_reward(sorted_: Axes, named: Axes, name: str, R: np.ndarray, ta
 
     entries = drawing.telling(values, called)
     drawing.named_bars(named, entries)
-    named.set(title=_of_all(name, len(entries), values.size, what), xlabel="reward")
+    named.set(title=of_all(name, len(entries), values.size, what), xlabel="reward")
 
 
-def _of_all(name: str, shown: int, n: int, what: str) -> str:
+def of_all(name: str, shown: int, n: int, what: str) -> str:
     """A title that says how many of all are named."""
     return f"{name}: all {n} {what}" if shown == n else f"{name}: highest and lowest {shown // 2} of {n:,} {what}"

@@ -22,12 +22,13 @@ from irl_gym.learners.base import Learner, checked_learner
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.rewards import plain_json
 from irl_gym.mdp.tabular_mdp import check_discount
+from irl_gym.records import Record
 from irl_gym.runs.choices import KNOWN, Reveals
 from irl_gym.tables.tabulate import By
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(Record):
     """What one run of the loop does.
 
     Raises:

@@ -11,6 +11,7 @@ from typing import Any
 
 from irl_gym.files import run_schema
 from irl_gym.files.run_folder import read_json, write_text
+from irl_gym.records import Record
 
 FORMAT = "irl_gym.Film/1"
 MOST_BYTES = 700_000
@@ -42,7 +43,7 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class Film(Record):
     """One episode, as a person watches it."""
 
     name: str

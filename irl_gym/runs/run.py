@@ -24,10 +24,12 @@ from irl_gym.judging.diagnoses.plain_words import with_names
 from irl_gym.judging.scores import RETRAINED, others
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.records import Record
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.films import Film, load_film
 from irl_gym.runs.identity import ENVIRONMENT, FIRST, STAGES, check_format, shell_command
-from irl_gym.runs.reading.belonging import at_odds, left_open, strangers
+from irl_gym.runs.reading.belonging import at_odds, left_open, misshapen, strangers
 from irl_gym.runs.reading.run_reader import RunReader
 from irl_gym.runs.reading.verified import FILES, Claim, again, claims, recomputed, shares, with_again
 from irl_gym.runs.scorecard import read_metrics, reward_told
@@ -43,7 +45,7 @@ METRICS = "metrics.json"
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Record):
     """What a run left."""
 
     path: Path
@@ -95,11 +97,6 @@ class Run:
     def agent(self) -> np.ndarray | None:
         """(S,) actions of the retrained agent, or (S, A); None where there is none, or no table."""
         return self.agents.get(RETRAINED)
-
-    @property
-    def rewarded(self) -> bool:
-        """Was a reward learned?"""
-        return self.learned is not None
 
     @property
     def tabular(self) -> TabularReward | None:
@@ -278,6 +275,9 @@ def _computed(
             what, files = "table, expert and reward", "table.npz, expert.npz and reward.npz"
         mend = f"delete {files}, and what they hold is made again"
         raise reader.incomplete(f"its {what} do not bear out its record: {error}; {mend}") from error
+    shaped = reader.maybe("reward_shaped.npz", ShapedReward.load)  # earlier versions kept none
+    if shaped is not None and tabular is not None and (fault := misshapen(shaped, tabular, table.mdp)) is not None:
+        raise reader.incomplete(fault)
     if now is not None:
         _check_claims(now[0], metrics, reader)
         metrics = with_again(metrics, now[1])

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from irl_gym.records import Record
+
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Report(Record):
     """What a run found, as it stands in the run's folder."""
 
     out: Path

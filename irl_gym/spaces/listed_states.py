@@ -15,12 +15,13 @@ from gymnasium import spaces
 
 from irl_gym.checks import any_array
 from irl_gym.errors import InvalidMDP, UnknownObservation
+from irl_gym.records import Record
 from irl_gym.spaces.integer_spaces import checked_members, first_of, from_numbers, ranges
 from irl_gym.spaces.states import Numbering
 
 
 @dataclass(frozen=True, eq=False)
-class ListedStates(Numbering):
+class ListedStates(Record, Numbering):
     """A one-to-one map between some observations of a space and the rows of a table.
 
     Raises:

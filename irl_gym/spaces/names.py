@@ -11,6 +11,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl_gym.spaces.listed_states import usual_observation
+from irl_gym.spaces.states import States
+
 _UP_RIGHT_DOWN_LEFT = ("up", "right", "down", "left")
 ACTIONS: dict[str, tuple[str, ...]] = {
     "FrozenLakeEnv": ("left", "down", "right", "up"),
@@ -43,6 +46,12 @@ class Names:
     """Of the actions 0, 1, ..."""
     state: Callable[[int], str]
     """Name of a row."""
+
+    @classmethod
+    def of(cls, env: gym.Env, states: States, env_id: str | None = None) -> "Names":
+        """Those of an environment and the numbering of its states."""
+        usual = usual_observation(states)
+        return cls(action_names(env), lambda row: state_name(env_id, states.decode(row), None, usual))
 
     @classmethod
     def numbered(cls, n_actions: int) -> "Names":

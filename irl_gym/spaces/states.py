@@ -16,6 +16,7 @@ from gymnasium import spaces
 
 from irl_gym.checks import any_array
 from irl_gym.errors import InvalidMDP, InvalidParameter, NotDiscrete, UnknownObservation
+from irl_gym.records import Record
 from irl_gym.spaces.integer_spaces import as_batch, checked_members, first_of, from_numbers, is_batch, ranges, to_numbers
 
 
@@ -180,7 +181,7 @@ class Numbering:
 
 
 @dataclass(frozen=True, eq=False)
-class StateIndex(Numbering):
+class StateIndex(Record, Numbering):
     """A one-to-one map between all observations of a space and the rows of a table.
 
     Raises:

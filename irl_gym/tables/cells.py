@@ -16,6 +16,7 @@ from gymnasium import spaces
 from irl_gym._typing import Indices, Points
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, UnknownObservation
+from irl_gym.records import Record
 from irl_gym.spaces.coordinates import Coordinates
 
 SNAP = 1e-9
@@ -23,7 +24,7 @@ SNAP = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(Record):
     """A numbering (`irl_gym.spaces.states.States`) of the cells of a regular grid.
 
     Raises:

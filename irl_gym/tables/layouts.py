@@ -14,13 +14,16 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.records import Record
+from irl_gym.spaces.states import StateIndex
+from irl_gym.tables.tabulation import Tabulation
 
 MOST_STARTS = 8
 """More start cells than this are not marked."""
 
 
 @dataclass(frozen=True, eq=False)
-class GridLayout:
+class GridLayout(Record):
     """The map that the first rows * columns states of a table fill row by row."""
 
     shape: tuple[int, int]
@@ -59,6 +62,12 @@ class GridLayout:
         blocked, terminal = (np.array(told[name], dtype=bool).reshape(rows, columns) for name in ("blocked", "terminal"))
         letters = np.array(told["letters"], dtype="<U1").reshape(rows, columns)
         return cls((rows, columns), np.array(told["directions"], dtype=int).reshape(-1, 2), blocked, terminal, letters)
+
+
+def map_of(env: gym.Env, table: Tabulation) -> GridLayout | None:
+    """The map of an environment whose table is exact and has all its cells as rows; None where some only are listed."""
+    exact = table.evidence.exact and isinstance(table.states, StateIndex)
+    return grid_layout(env, table.mdp) if exact else None
 
 
 def grid_layout(env: gym.Env, table: TransitionTable) -> GridLayout | None:

@@ -19,6 +19,7 @@ from irl_gym.errors import NotTabular, TableMismatch, UnknownObservation
 from irl_gym.intervals import mean_interval
 from irl_gym.mdp.policies import generator
 from irl_gym.mdp.tabular_mdp import TabularMDP, entry_positions
+from irl_gym.records import Record
 from irl_gym.spaces.states import States
 from irl_gym.tables.copies.stripped import without_watchers
 
@@ -35,7 +36,7 @@ OUTSIDE = (
 
 
 @dataclass(frozen=True, eq=False)
-class Payments:
+class Payments(Record):
     """What the table says of rewards."""
 
     mean: Matrix
@@ -49,7 +50,7 @@ class Payments:
 
 
 @dataclass(frozen=True)
-class SelfCheck:
+class SelfCheck(Record):
     """What sampling `env.step` found; it found no contradiction, or an error was raised."""
 
     steps: int

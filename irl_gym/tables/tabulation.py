@@ -12,13 +12,14 @@ import scipy.sparse as sp
 from irl_gym._typing import Matrix, Sparse
 from irl_gym.mdp.rewards import RewardFunction, TabularReward
 from irl_gym.mdp.tabular_mdp import AS_GOOD_AS_EXACT, TabularMDP, TransitionTable, entry_positions, entry_rows
+from irl_gym.records import Record
 from irl_gym.spaces.states import States
 from irl_gym.tables.repeats import Repeats
 from irl_gym.tables.selfcheck import Payments, SelfCheck
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Evidence(Record):
     """How a table was obtained, and what the check against `env.step` found."""
 
     method: str
@@ -73,7 +74,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(Record):
     """The samples behind a table that is not exact."""
 
     frequencies: np.ndarray
@@ -85,7 +86,7 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Tabulation:
+class Tabulation(Record):
     """An environment as a table."""
 
     mdp: TabularMDP

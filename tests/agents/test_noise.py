@@ -10,7 +10,7 @@ from irl_gym.agents.noise import Noisy, boltzmann, boltzmann_expert, noisy
 from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.judging.metrics import policy_value
 from irl_gym.mdp.episodes import collect
-from irl_gym.mdp.planning.dynamic_programming import backup, evaluate_policy, value_iteration
+from irl_gym.mdp.planning.dynamic_programming import backup, policy_evaluation, value_iteration
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution
 from irl_gym.spaces.states import StateIndex
 
@@ -155,7 +155,7 @@ def test_boltzmann_expert_is_the_softmax_of_the_experts_own_values(toy_text):
     table = toy_text("FrozenLake 4x4 slippery")
     policy = value_iteration(table.mdp, table.reward).policy
     R = table.reward.expected(table.mdp)
-    Q = backup(table.mdp, R, evaluate_policy(table.mdp, R, policy))
+    Q = backup(table.mdp, R, policy_evaluation(table.mdp, R, policy))
     np.testing.assert_allclose(boltzmann_expert(table.mdp, table.reward, policy, 0.05), boltzmann(Q, 0.05), rtol=1e-12)
 
 

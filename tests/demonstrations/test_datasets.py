@@ -294,3 +294,17 @@ def test_an_environment_that_nobody_could_make_again_is_refused(episodes, env, t
     with pytest.raises(InvalidParameter, match=r"FrozenLake-v1 cannot be written as json.*entry_point='module:Class'"):
         write(episodes, env, tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_dataset_is_a_sequence_of_its_episodes(tmp_path):
+    env = gym.make("FrozenLake-v1")
+    actor = TabularPolicy(np.full((16, 4), 0.25), StateIndex(env.observation_space))
+    made = list(collect(env, actor, 5, seed=0))
+    write_minari(made, ID, env, root=tmp_path, algorithm="random")
+    read = read_minari(ID, root=tmp_path)
+    told = [str(vars(one)) for one in made]
+    assert len(read) == 5 and [str(vars(one)) for one in read] == [str(vars(one)) for one in read] == told
+    assert [str(vars(read[i])) for i in (0, -1)] == [told[0], told[-1]]
+    assert [str(vars(one)) for one in read[1:4][::2]] == told[1:4:2]
+    with pytest.raises(IndexError):
+        read[5]

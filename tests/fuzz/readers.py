@@ -16,11 +16,12 @@ from irl_gym.demonstrations.recorded import recorded_environment
 from irl_gym.demonstrations.shards import Shards
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.features.feature_maps import OneHot, Table, Unravel
-from irl_gym.features.linear_reward import LinearReward, load_reward
+from irl_gym.features.linear_reward import LinearReward, load_payment
 from irl_gym.judging.ambiguity.lambda_path import LambdaPath, lambda_path
 from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.enumeration.explored import Explored, load_explored
 from irl_gym.tables.table_files import load_table, save_table
@@ -82,6 +83,7 @@ def read_search(folder):
 def write_rewards(folder):
     TabularReward.learned(np.linspace(-1, 1, 16), {"learner": "FiniteLP", "l1": 0.5}).save(folder / "reward.npz")
     TabularReward(np.ones((16, 4))).save(folder / "steps.npz")
+    ShapedReward(TabularReward(np.zeros((16, 4))), TabularReward(np.ones(16)), 0.5).save(folder / "shaped.npz")
 
 
 def write_linear(folder):
@@ -97,7 +99,7 @@ def write_linear(folder):
 
 def read_rewards(folder):
     for path in sorted(folder.iterdir()):
-        sound_reward(load_reward(path))
+        sound_reward(load_payment(path))
 
 
 def write_path(folder):

@@ -4,6 +4,7 @@ import numpy as np
 from gymnasium import spaces
 
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.spaces.states import StateIndex
 
 SPACE = spaces.Discrete(16)
@@ -24,6 +25,10 @@ def sound_table(table):
 
 
 def sound_reward(reward):
+    if isinstance(reward, ShapedReward):
+        assert reward.values.shape[: reward.learned.values.ndim] == reward.learned.values.shape
+        sound_reward(reward.paid)
+        reward = reward.learned
     if isinstance(reward, TabularReward):
         assert np.isfinite(reward.values).all() and reward.values.ndim in (1, 2) and np.isfinite(reward.tolerance)
         return

@@ -21,7 +21,7 @@ from irl_gym.judging.metrics import (
     tie_aware_agreement,
     worst_tie,
 )
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, occupancy, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import occupancy, policy_evaluation, policy_iteration
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
@@ -148,7 +148,7 @@ def test_regret_is_the_optimal_value_less_the_policy_s_in_each_state(model):
     policy = np.zeros(model.mdp.n_states, dtype=np.int64)
     found = regret(model.mdp, TabularReward(model.R), policy)
     everything = [
-        evaluate_policy(model.mdp, TabularReward(model.R), one)
+        policy_evaluation(model.mdp, TabularReward(model.R), one)
         for one in (policy_iteration(model.mdp, model.step_reward).policy, policy)
     ]
     assert found.per_state == pytest.approx(everything[0] - everything[1], abs=1e-9)

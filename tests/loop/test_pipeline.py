@@ -2,23 +2,28 @@
 
 import json
 
+import gymnasium as gym
 import minari
 import numpy as np
 import pytest
 
 from irl_gym.agents.planners import SB3, ValueIteration, load_agent
 from irl_gym.demonstrations.datasets import minari_root
+from irl_gym.environments.learned_reward import LearnedReward
 from irl_gym.errors import DegenerateExpert, InvalidParameter, NotDiscrete, RunConflict, UnknownEnvironment
 from irl_gym.judging.distances import epic, starc
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.loop.loop import Loop
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ExpectedAdvantage, ShapedReward
 from irl_gym.runs.experiment import Experiment
+from irl_gym.tables.tabulate import tabulate
 
 FILES = (
-    "config.json", "expert.npz", "reward.npz", "certificate.json", "agent.zip", "agent_policy.npz", "learning_curve.csv",
-    "metrics.json", "figures/rewards.png", "figures/values.png", "figures/policies.png", "figures/learning_curve.png",
+    "config.json", "expert.npz", "reward.npz", "reward_shaped.npz", "certificate.json", "agent.zip", "agent_policy.npz",
+    "learning_curve.csv", "metrics.json",
+    "figures/rewards.png", "figures/values.png", "figures/policies.png", "figures/learning_curve.png",
 )  # fmt: skip
 SMALL = {"episodes": 20, "eval_episodes": 20, "num_envs": 16, "env_kwargs": {"is_slippery": False}}
 
@@ -55,6 +60,23 @@ def planned(tmp_path_factory):
 @pytest.mark.parametrize("name", FILES)
 def test_a_run_leaves(report, name):
     assert (report.out / name).stat().st_size > 0
+
+
+def test_a_run_leaves_what_its_own_agent_is_paid(report):
+    reward, table = (
+        TabularReward.load(report.out / "reward.npz"),
+        tabulate(gym.make("FrozenLake-v1", is_slippery=False), gamma=0.99),
+    )
+    paid = ShapedReward.load(report.out / "reward_shaped.npz")
+    clip = json.loads((report.out / "certificate.json").read_text())["proof"]["margin_cap"]
+    assert np.array_equal(paid.values, ExpectedAdvantage(clip).apply(reward, table.mdp).values)
+
+
+def test_an_environment_pays_the_shaped_reward_of_a_run(report):
+    env = LearnedReward(gym.make("FrozenLake-v1", is_slippery=False), report.out / "reward_shaped.npz")
+    env.reset(seed=0)
+    expert = np.load(report.out / "expert.npz")["actions"]
+    assert env.step(int(expert[0]))[1] == 0
 
 
 def test_a_run_leaves_nothing_half_written(report):

@@ -6,10 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from models import models, random_model
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration, tied
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.shaping import ExpectedAdvantage, PositiveScaling, PotentialShaping, Unchanged, typical_loss
+from irl_gym.mdp.shaping import (
+    ExpectedAdvantage,
+    PositiveScaling,
+    PotentialShaping,
+    ShapedReward,
+    Unchanged,
+    typical_loss,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -119,3 +126,30 @@ def test_typical_loss_clips_half_of_the_losses_at_most():
     clipped = ExpectedAdvantage(typical_loss(reward, model.mdp)).apply(reward, model.mdp).values
     second = np.sort(clipped, axis=1)[:, -2]
     assert (second > -1).mean() == pytest.approx(0.5, abs=0.1)
+
+
+@given(model=models(), seed=SEEDS)
+def test_a_shaped_reward_keeps_the_set_of_optimal_policies(model, seed):
+    for reward in rewards_of(model, seed):
+        assert np.array_equal(optimal_sets(model, reward), optimal_sets(model, ShapedReward.of(reward, model.mdp).paid))
+
+
+def test_a_shaped_reward_is_kept_in_a_file(tmp_path):
+    model = random_model(0)
+    made = ShapedReward.of(TabularReward.learned(model.R, {"learner": "FiniteLP"}), model.mdp)
+    made.save(tmp_path / "shaped.npz")
+    read = ShapedReward.load(tmp_path / "shaped.npz")
+    assert np.array_equal(read.values, made.values) and np.array_equal(read.learned.values, model.R)
+    assert (read.clip, read.paid.tolerance, read.learned.note) == (made.clip, made.paid.tolerance, {"learner": "FiniteLP"})
+
+
+def test_a_file_of_a_plain_reward_is_no_shaped_one(tmp_path):
+    TabularReward(np.zeros(3)).save(tmp_path / "reward.npz")
+    with pytest.raises(InvalidReward, match="holds a TabularReward: expected a ShapedReward"):
+        ShapedReward.load(tmp_path / "reward.npz")
+
+
+@pytest.mark.parametrize(("paid", "learned"), [((3,), (3,)), ((3, 2), (4,)), ((3, 2), (3, 3))])
+def test_a_shaped_reward_of_other_states_or_actions_is_refused(paid, learned):
+    with pytest.raises(InvalidReward, match="expected"):
+        ShapedReward(TabularReward(np.zeros(paid)), TabularReward(np.zeros(learned)))

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from tiny_env import TableEnv, lottery
 from windy_env import Calm
 
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation, policy_iteration
 from irl_gym.tables.counted.counting import Interaction
 from irl_gym.tables.enumeration.table import Enumeration
 
@@ -51,7 +51,7 @@ def test_the_error_of_values_holds_for_the_policy_that_was_planned_and_for_any_o
     for seed in range(4):
         table, best = walked(30_000, seed)
         for policy in (best.policy, np.zeros(9, dtype=int), np.full((9, 4), 0.25)):
-            said = float(table.mdp.d0 @ evaluate_policy(table.mdp, table.reward, policy))
+            said = float(table.mdp.d0 @ policy_evaluation(table.mdp, table.reward, policy))
             assert abs(said - TRUTH) <= table.evidence.value_error < 1 / (1 - GAMMA)
 
 

@@ -31,6 +31,7 @@ from irl_gym.mdp.policies import completed
 from irl_gym.mdp.rewards import TabularReward, read_archive, write_archive
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.programs.deadline import Deadline
+from irl_gym.records import Record
 
 FORMAT = "irl_gym.LambdaPath/1"
 ARRAYS = ("breakpoints", "rewards", "margins", "l1_norms", "total_margins", "gaps")
@@ -41,7 +42,7 @@ or the cap, the smaller."""
 
 
 @dataclass(frozen=True, eq=False)
-class LambdaPath:
+class LambdaPath(Record):
     """The rewards that FiniteLP gives as lambda rises, and where each begins and ends.
 
     Piece i is optimal for lambda from breakpoints[i] to breakpoints[i + 1], both included; R = 0 is above the last.

@@ -33,6 +33,7 @@ from irl_gym.learners.linear_programs.programs import NO_MARGIN, RewardOn
 from irl_gym.learners.linear_programs.proofs.finite_proof import served
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.deadline import Deadline
+from irl_gym.records import Record
 
 Pins = Mapping[Any, float]
 """State, or (state, action), -> its reward."""
@@ -41,7 +42,7 @@ NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Widths:
+class Widths(Record):
     """The least and the largest reward that the feasible set leaves each state, or each state and action."""
 
     low: np.ndarray

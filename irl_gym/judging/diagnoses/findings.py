@@ -8,6 +8,7 @@ import numpy as np
 
 from irl_gym._typing import Indices
 from irl_gym.facts import counted as counted
+from irl_gym.records import Record
 
 MOST_NAMED = 5
 """States that a sentence names; the others are counted."""
@@ -16,7 +17,7 @@ WHERE = "{where}"
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class Finding(Record):
     """One thing that is wrong, or that makes the reward less useful than it could be."""
 
     name: str
@@ -49,7 +50,7 @@ Health = Literal["healthy", "findings", "not examined"]
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class Diagnosis(Record):
     """All that the doctor found."""
 
     findings: tuple[Finding, ...]

@@ -9,7 +9,7 @@ from irl_gym.judging.diagnoses.mends import Mend, breaking, on_steps
 from irl_gym.judging.diagnoses.unseen import entered
 from irl_gym.judging.metrics import policy_value, random_value
 from irl_gym.judging.scores import EXPERT, FEWEST, RANDOM, RETRAINED, Scale
-from irl_gym.mdp.planning.dynamic_programming import backup, evaluate_policy, occupancy
+from irl_gym.mdp.planning.dynamic_programming import backup, occupancy, policy_evaluation
 
 BLIND = 0.2
 """Share of what an expert had over random actions when it was trained; who lacks more may not see what it saw."""
@@ -136,7 +136,7 @@ def lossy_ties(case: Case) -> Finding | None:
     """
     if case.continued is None or case.worst is None or not case.speaks or case.mdp is None or case.true is None:
         return None
-    V, worst = evaluate_policy(case.mdp, case.true, case.continued), case.worst
+    V, worst = policy_evaluation(case.mdp, case.true, case.continued), case.worst
     fair, random = float(case.mdp.d0 @ V), random_value(case.mdp, case.true)
     much = max(MUCH * abs(fair - random), case.true_tie)
     if fair - worst.value <= much:

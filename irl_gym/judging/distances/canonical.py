@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 from irl_gym._typing import Numbers, Sparse, Vector
 from irl_gym.judging.distances.coverage import Coverage, coverage_of, probabilities
 from irl_gym.judging.distances.payments import StepPayments
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
 REFINEMENTS = 3
@@ -149,7 +149,7 @@ class ValueAdjustedLevelling:
         """(n,) C(R)(s, a, s')."""
         R = reward.expected(mdp)
         uniform = np.full(R.shape, 1 / mdp.n_actions)
-        V = evaluate_policy(mdp, R, uniform if self.policy is None else self.policy)
+        V = policy_evaluation(mdp, R, uniform if self.policy is None else self.policy)
         return _shaped_values(mdp, reward, R, V, coverage, self.levelled)
 
     def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:

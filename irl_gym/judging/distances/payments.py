@@ -16,10 +16,11 @@ from irl_gym.errors import InvalidReward
 from irl_gym.judging.distances.comparing import numbers
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp, entry_rows
+from irl_gym.records import Record
 
 
 @dataclass(frozen=True, eq=False)
-class StepPayments:
+class StepPayments(Record):
     """R(s, a, s') as a sum of three parts."""
 
     step: Matrix

@@ -48,11 +48,12 @@ from irl_gym.mdp.policies import Policy, completed
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.killable import within
 from irl_gym.programs.solvers import SolverName, Solving
+from irl_gym.records import Record
 from irl_gym.spaces.states import States
 
 
 @dataclass(frozen=True, eq=False)
-class FeatureLP:
+class FeatureLP(Record):
     """Linear-programming IRL for large state spaces, with rewards linear in features (Ng & Russell 2000, section 4).
 
     Raises:
@@ -145,7 +146,7 @@ class FeatureLP:
                 return self._fit_table(world, expert, states, solving)
         raise InvalidMDP(
             f"the world is a {type(world).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
-            "GenerativeModel(env, gamma)."
+            "GenerativeModel(env, gamma), first, and then the expert."
         )
 
     @property

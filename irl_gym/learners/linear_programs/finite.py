@@ -55,10 +55,11 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.programs.killable import within
 from irl_gym.programs.solvers import SolverName, Solving, Status, check_solving
+from irl_gym.records import Record
 
 
 @dataclass(frozen=True)
-class FiniteLP:
+class FiniteLP(Record):
     """Linear-programming IRL for finite state spaces (Ng & Russell 2000, section 3.2).
 
     Raises:

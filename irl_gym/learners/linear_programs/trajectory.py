@@ -37,10 +37,11 @@ from irl_gym.learners.problem import Problem, World
 from irl_gym.mdp.episodes import Episode
 from irl_gym.programs.killable import within
 from irl_gym.programs.solvers import SolverName, Solving, Status
+from irl_gym.records import Record
 
 
 @dataclass(frozen=True, eq=False)
-class TrajectoryLP:
+class TrajectoryLP(Record):
     """Linear-programming IRL from sampled trajectories (Ng & Russell 2000, section 5).
 
     Raises:

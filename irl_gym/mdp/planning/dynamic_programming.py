@@ -17,16 +17,17 @@ from irl_gym.mdp.planning.discounted import EPSILON, Discounted
 from irl_gym.mdp.planning.howard import Optimum, howard, sweeps_of
 from irl_gym.mdp.planning.precise import horizon
 from irl_gym.mdp.policies import as_distribution
-from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.rewards import TabularReward, check_reward_itself
+from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
 from irl_gym.programs.killable import check_limit
+from irl_gym.records import Record
 
 Reward = Matrix | TabularReward
 """(S, A) what a step pays in expectation, or a TabularReward of either kind."""
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Record):
     """An optimal policy with its values, and how far from optimal they can be."""
 
     V: Vector
@@ -50,8 +51,11 @@ def checked_reward(mdp: TabularMDP, R: Reward) -> Matrix:
     """Return R, an array or a TabularReward, as (S, A) floats with zero rows at terminal states.
 
     Raises:
+        InvalidMDP: no table.
         InvalidReward: wrong shape, NaN or infinite.
     """
+    mdp = checked_mdp(mdp)
+    check_reward_itself(R)
     if isinstance(R, TabularReward):
         R = R.expected(mdp)
     array = float_array("the reward", R, "(S, A) numbers", InvalidReward)
@@ -156,7 +160,7 @@ def value_iteration(
     )
 
 
-def evaluate_policy(mdp: TabularMDP, R: Reward, policy: Actions | Matrix | ActionSets) -> Vector:
+def policy_evaluation(mdp: TabularMDP, R: Reward, policy: Actions | Matrix | ActionSets) -> Vector:
     """V = (I - gamma P_pi)^-1 R_pi by one sparse factorisation, equation (5) of Ng & Russell with rewards on steps.
 
     Fast where successors are near one another, as on grids; where they are anywhere the factors fill in.
@@ -165,7 +169,7 @@ def evaluate_policy(mdp: TabularMDP, R: Reward, policy: Actions | Matrix | Actio
         InvalidReward: wrong shape or not finite.
         InvalidPolicy: wrong shape or content.
     """
-    mixing = mdp.mixing(policy)
+    mixing = checked_mdp(mdp).mixing(policy)
     return Discounted(sp.csr_array(mixing @ mdp.P), mdp.gamma).solve(mixing @ checked_reward(mdp, R).ravel())
 
 
@@ -202,7 +206,7 @@ def policy_iteration(
 def optimum(mdp: TabularMDP, R: Reward, *, allowed: ActionSets | None = None, max_iterations: int = 10_000) -> Optimum:
     """What policy iteration finds, with advantages in extended precision and bounds; arguments and errors as there."""
     reward = R if isinstance(R, TabularReward) else TabularReward(checked_reward(mdp, R))
-    shape = reward.expected(mdp).shape
+    shape = reward.expected(checked_mdp(mdp)).shape
     if allowed is not None and np.shape(allowed) != shape:
         raise InvalidParameter(f"allowed has shape {np.shape(allowed)}: expected {shape}, a set of actions for each state.")
     blocked = np.zeros(shape, dtype=bool) if allowed is None else ~np.asarray(allowed, dtype=bool)

@@ -35,6 +35,11 @@ class RunContents:
         return self.run.place_name
 
     @property
+    def rewarded(self) -> bool:
+        """Was a reward learned?"""
+        return self.run.learned is not None
+
+    @property
     def given(self) -> bool:
         """Was a dataset given, in place of an expert?"""
         return self.run.config.get("dataset") is not None

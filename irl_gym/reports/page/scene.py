@@ -12,7 +12,7 @@ import numpy as np
 from irl_gym._typing import ActionSets, Indices, Matrix, StateMask, Vector
 from irl_gym.judging.evaluation import good_actions
 from irl_gym.judging.metrics import ties_of
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, optimum
+from irl_gym.mdp.planning.dynamic_programming import optimum, policy_evaluation
 from irl_gym.mdp.planning.howard import Optimum
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward
@@ -117,7 +117,7 @@ class Scene:
 
     def value(self, reward: TabularReward, policy: Matrix) -> Vector:
         """(S,) a policy's value; NaN in states that are not judged."""
-        return np.where(self.acting, evaluate_policy(self.mdp, reward, policy), np.nan)
+        return np.where(self.acting, policy_evaluation(self.mdp, reward, policy), np.nan)
 
     def name(self, row: int) -> str:
         """What a state is called."""

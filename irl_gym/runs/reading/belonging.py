@@ -9,10 +9,15 @@ from typing import Any
 import numpy as np
 
 from irl_gym.judging.scores import LEARNED, RETRAINED
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ExpectedAdvantage, ShapedReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.tables.layouts import GridLayout
 
 MADE_AGAIN = "delete it, and its stage is run again"
 WIDTHS = ("low", "high", "width")
+WITHIN = 1e-6
+"""Share of the largest value by which two computations may differ."""
 
 
 def strangers(
@@ -102,3 +107,18 @@ def left_open(
         yield f"ambiguity.npz has a path with r_max {r_max:g} and margin_cap {cap:g}: expected both above 0; {MADE_AGAIN}"
     if not (np.diff(path["breakpoints"], prepend=0.0) >= 0).all():
         yield f"ambiguity.npz has breakpoints that do not increase from 0; {MADE_AGAIN}"
+
+
+def misshapen(shaped: ShapedReward, learned: TabularReward, mdp: TabularMDP) -> str | None:
+    """What is wrong with reward_shaped.npz, likewise; None where it is the shaping of the learned reward on this table."""
+    known = shaped.learned.values
+    if known.shape != learned.values.shape or not _alike(known, learned.values):
+        return f"reward_shaped.npz is of another reward than reward.npz; {MADE_AGAIN}"
+    now = ExpectedAdvantage(shaped.clip).apply(learned, mdp).values
+    if now.shape != shaped.values.shape or not _alike(shaped.values, now):
+        return f"reward_shaped.npz has not what reward.npz and table.npz give, the expected advantage; {MADE_AGAIN}"
+    return None
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.abs(one - other).max(initial=0.0) <= WITHIN * np.abs(other).max(initial=0.0))

@@ -13,7 +13,7 @@ from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, InvalidR
 from irl_gym.judging.ambiguity.feasible import feasible_reward, membership, sample_feasible
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.optimality import certify
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, policy_iteration
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation, policy_iteration
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -30,7 +30,7 @@ def optimal_by_planning(mdp, expert, reward):
     """Does exact planning find nothing better than the expert?"""
     found = policy_iteration(mdp, reward)
     best = found.V
-    return bool(np.abs(best - evaluate_policy(mdp, reward, expert)).max() <= 1e-8)
+    return bool(np.abs(best - policy_evaluation(mdp, reward, expert)).max() <= 1e-8)
 
 
 @given(models.models(), seeds, st.integers(0, 2))

@@ -9,9 +9,9 @@ from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.planning.dynamic_programming import (
     backup,
-    evaluate_policy,
     greedy,
     occupancy,
+    policy_evaluation,
     policy_iteration,
     tied,
     value_iteration,
@@ -75,7 +75,7 @@ def test_policy_iteration_error_bounds_the_distance_from_the_optimum(model):
 @given(model=models.models())
 def test_planner_policy_earns_the_optimal_values(plan, model):
     R = step_rewards(model)
-    earned = evaluate_policy(model.mdp, R, plan(model.mdp, R).policy)
+    earned = policy_evaluation(model.mdp, R, plan(model.mdp, R).policy)
     np.testing.assert_allclose(earned, reference.values(model.P, model.mdp.gamma, R), atol=1e-6)
 
 
@@ -137,14 +137,14 @@ def test_evaluate_policy_equals_the_explicit_inverse(model, kind):
     P_pi = np.einsum("sa,sat->st", distribution, model.P)
     R_pi = np.where(model.mdp.terminal, 0, (distribution * R).sum(axis=1))
     expected = np.linalg.inv(np.eye(model.mdp.n_states) - model.mdp.gamma * P_pi) @ R_pi
-    np.testing.assert_allclose(evaluate_policy(model.mdp, R, policy), expected, atol=1e-9)
+    np.testing.assert_allclose(policy_evaluation(model.mdp, R, policy), expected, atol=1e-9)
 
 
 @given(model=models.models(), kind=policies)
 def test_occupancy_times_reward_is_the_value_from_the_start(model, kind):
     policy, _ = some_policy(model, kind)
     R = step_rewards(model)
-    expected = model.mdp.d0 @ evaluate_policy(model.mdp, R, policy)
+    expected = model.mdp.d0 @ policy_evaluation(model.mdp, R, policy)
     assert (occupancy(model.mdp, policy) * R).sum() == pytest.approx(expected)
 
 
@@ -233,7 +233,7 @@ def test_policy_iteration_refuses_a_state_without_allowed_actions():
 @pytest.mark.parametrize("policy", [np.zeros(6, dtype=int), np.full(7, 3)])
 def test_evaluate_policy_refuses_what_is_no_policy(policy, unchecked):
     with pytest.raises(InvalidPolicy, match="expected"):
-        evaluate_policy(models.random_model(0).mdp, np.zeros((7, 3)), policy)
+        policy_evaluation(models.random_model(0).mdp, np.zeros((7, 3)), policy)
 
 
 def test_planning_takes_a_tabular_reward_as_it_is():

@@ -15,6 +15,7 @@ from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.runs.certificates import claims_in, facts_in
 from irl_gym.runs.diagnosed import diagnose_run
 from irl_gym.runs.reading.verified import again, claims, recomputed, shares, with_again
@@ -49,6 +50,28 @@ def test_a_run_whose_files_do_not_bear_out_its_record_is_refused(unvouched, swap
     swap(unvouched)
     with pytest.raises(RunIncomplete, match=f"table, expert and reward do not bear out its record: .*{found}"):
         read_run(unvouched)
+
+
+def reshaped(path, reward=lambda one: one, paid=lambda one: one):
+    one = ShapedReward.load(path / "reward_shaped.npz")
+    changed = (TabularReward(change(kind.values), kind.note) for kind, change in ((one.paid, paid), (one.learned, reward)))
+    ShapedReward(*changed, one.clip).save(path / "reward_shaped.npz")
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [({"reward": lambda R: R + 1}, "of another reward than reward.npz"), ({"paid": np.negative}, "the expected advantage"),
+     ({"reward": lambda R: R[:-1], "paid": lambda R: R[:-1]}, "of another reward than reward.npz")],
+)  # fmt: skip
+def test_a_shaped_reward_that_is_not_that_of_the_run_is_refused(unvouched, change, found):
+    reshaped(unvouched, **change)
+    with pytest.raises(RunIncomplete, match=found):
+        read_run(unvouched)
+
+
+def test_a_run_of_an_earlier_version_has_no_shaped_reward(unvouched):
+    (unvouched / "reward_shaped.npz").unlink()
+    assert read_run(unvouched).recomputed
 
 
 def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(unvouched, finished):

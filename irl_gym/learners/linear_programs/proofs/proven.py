@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from irl_gym.facts import Fact, aligned, plain
+from irl_gym.records import Record
 
 ROUNDING = 1e-7
 """A gap below this share of the objective is none."""
 
 
-class Proven:
+class Proven(Record):
     """What every proof says of the program's optimum."""
 
     known: ClassVar[bool] = True

@@ -56,7 +56,7 @@ LACKS: Mapping[str, Lack] = {
 """By what a section needs; what else is not there is not missed, as the section of the table says what goes with it."""
 
 
-def absent(need: str, stages: Mapping[str, Mapping[str, Any]], *, rewarded: bool) -> Section | None:
+def absent(need: str, stages: Mapping[str, Mapping[str, Any]], rewarded: bool) -> Section | None:
     """In place of a section that needs what is not there; None where nothing is missed.
 
     Args:

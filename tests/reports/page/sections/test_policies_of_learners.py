@@ -2,7 +2,7 @@
 
 import pytest
 
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation
 from irl_gym.reports.page.contents import RunContents
 from irl_gym.reports.page.report import write_report
 from irl_gym.reports.page.sections.compared import policies, values
@@ -28,7 +28,7 @@ def test_values_of_the_learner_s_policy_are_those_of_the_true_reward(policy_run)
     scene = RunContents(read_run(policy_run("policy"))).scene
     (name, policy), section = *scene.agents.items(), values(scene)
     V, (panel,) = (
-        evaluate_policy(scene.mdp, scene.table.reward, policy),
+        policy_evaluation(scene.mdp, scene.table.reward, policy),
         (one for one in section.panels if one.name == "value-own"),
     )
     shown = [one for row in panel.figure.data[1].z for one in row if one is not None]

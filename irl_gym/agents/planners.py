@@ -138,7 +138,7 @@ class Agent:
             UnknownObservation, InvalidParameter: as `shown`.
         """
         observation = self.shown(observation)
-        with _torch_threads(1):
+        with torch_threads(1):
             return self.model.predict(observation, state, episode_start, deterministic)
 
     def save(self, path: str | os.PathLike) -> None:
@@ -223,7 +223,7 @@ class SB3:
             log: folder for SB3's own scalars, as TensorBoard reads them; None for no log.
         """
         settings = self._settings(env)
-        with _torch_threads(self.threads):
+        with torch_threads(self.threads):
             model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
             agent = Agent(model, env.states if isinstance(env, TabularVecEnv) and env.shows_rows else None)
             callback = _Report(agent, progress, interval or max(1, self.total_timesteps // 100)) if progress else None
@@ -285,7 +285,8 @@ class _Report(BaseCallback):
 
 
 @contextlib.contextmanager
-def _torch_threads(threads: int) -> Iterator[None]:
+def torch_threads(threads: int) -> Iterator[None]:
+    """So many threads of torch, in a block."""
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
@@ -296,5 +297,4 @@ def _torch_threads(threads: int) -> Iterator[None]:
 
 def tabular_actions(policy: Policy, states: States) -> Actions:
     """(S,) the action that a policy takes, deterministically, in each state."""
-    actions, _ = policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)
-    return np.asarray(actions).astype(np.int64)
+    return np.asarray(policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)[0]).astype(np.int64)

@@ -82,8 +82,9 @@ class Outcome(Generic[AnyReward, AnyProof]):
 class Learner(Protocol):
     """Learns from what is known of an expert and a world: a frozen record of hyper-parameters.
 
-    It may say in `how` how its policy comes about, and in `of_feasible_set` that its reward is one of all those under which the
-    expert is optimal, so that these are examined: then it has `r_max` and `reward_on`, as FiniteLP has.
+    It may say in `how` how its policy comes about; in `on_rows` that its policy is one of a table's rows; and in
+    `of_feasible_set` that its reward is one of all those under which the expert is optimal, so that these are examined: then it
+    has `r_max` and `reward_on`, as FiniteLP has.
     """
 
     needs: ClassVar[Needs]

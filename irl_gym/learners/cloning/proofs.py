@@ -109,7 +109,7 @@ def told_of(
     """
     acting = acting_in(table, len(counts))
     total = counts.sum()
-    loss = -float(xlogy(counts, policy).sum() / total)
+    loss = max(0.0, -float(xlogy(counts, policy).sum() / total))
     least = float((xlogy(counts.sum(axis=1), counts.sum(axis=1)).sum() - xlogy(counts, counts).sum()) / total)
     return {
         "steps": float(total), "shown": int((counts.sum(axis=1) > 0).sum()), "acting": int(acting.sum()),

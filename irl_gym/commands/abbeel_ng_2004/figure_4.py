@@ -3,10 +3,11 @@
     mimic the expert    the expert's action in each cell that was shown, random moves in the others:  Clone()
     one distribution    a macrocell, that of all steps shown in it:                                   Clone(cells=...)
     one action          a macrocell, the most frequent of the steps shown in it:                      the same, majority=True
-The last two err however much is shown. Of a macrocell that was not shown the second moves at random; the third has one action in
-all of it, drawn once, which also decides between actions as frequent. (At random at each step in its place: about 0.03 less, and
-farther from the paper.) Values are exact. The paper prints no length of a trajectory: 100 steps; 460 give 0.03 more where few are
-shown. The method's own curve is not of this experiment. Axes: n instances, C curves, M numbers of trajectories.
+The last two err however much is shown. In a macrocell that was not shown the second moves at random; the third has one action,
+drawn once for all of it, which also decides between actions as frequent. (Random at each step in its place, it is worth about
+0.02 less, farther from the paper.) Values are exact. The paper prints no length of a trajectory; with 460 steps in place of 100
+those of few trajectories are worth about 0.03 more. The method's own curve is not of this experiment.
+Axes: n instances, C curves, M numbers of trajectories.
 """
 
 from collections.abc import Iterator
@@ -66,7 +67,7 @@ class Figure4:
             R = np.repeat(self.world.weights(rng)[self.world.cells][:, None], mdp.n_actions, axis=1)
             expert = value_iteration(mdp, R, sweeps=30).policy
             best = mdp.d0 @ evaluate_policy(mdp, R, expert)
-            drawn, shares = np.eye(mdp.n_actions)[rng.integers(mdp.n_actions, size=mdp.n_states)[self.world.cells]], []
+            drawn, shares = np.eye(mdp.n_actions)[rng.integers(mdp.n_actions, size=self.world.n_cells)[self.world.cells]], []
             for counts in self._shown(mdp, expert, rng):
                 seen = (counts, counts, counts + FAINT * drawn)
                 clones = [one.fit(steps).policy for one, steps in zip(learners, seen, strict=True)]

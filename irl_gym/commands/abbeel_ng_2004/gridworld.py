@@ -35,6 +35,11 @@ class Gridworld:
     """Probability that the weight of a macrocell is 0."""
 
     @property
+    def n_cells(self) -> int:
+        """K."""
+        return (self.side // self.block) ** 2
+
+    @property
     def cells(self) -> np.ndarray:
         """(S,) the macrocell of each cell."""
         rows, columns = np.divmod(np.arange(self.side**2), self.side)
@@ -51,8 +56,7 @@ class Gridworld:
 
     def weights(self, rng: np.random.Generator) -> np.ndarray:
         """(K,) weights of the true reward, of sum 1."""
-        K = (self.side // self.block) ** 2
         while True:
-            w = np.where(rng.random(K) < self.zero, 0.0, rng.random(K))
+            w = np.where(rng.random(self.n_cells) < self.zero, 0.0, rng.random(self.n_cells))
             if np.count_nonzero(w) >= 2:
                 return w / w.sum()

@@ -30,6 +30,7 @@ def run(script, monkeypatch, tmp_path):
         ("own_learners:Copycat", "learned", "Not examined: the learner gives a policy", 3),
         ("clone", "learned", "without demonstrations", 3),
         ("softmax-clone", "learned", "above the least of its class", 3),
+        ("neural-clone", "learned", "its action is another in", 3),
     ],
 )
 def test_a_learner_of_ones_own_goes_through_the_loop_and_its_reports(run, script, tmp_path, name, policy, told, code):

@@ -139,7 +139,7 @@ class Agent(Record):
             UnknownObservation, InvalidParameter: as `shown`.
         """
         observation = self.shown(observation)
-        with _torch_threads(1):
+        with torch_threads(1):
             return self.model.predict(observation, state, episode_start, deterministic)
 
     def save(self, path: str | os.PathLike) -> None:
@@ -226,7 +226,7 @@ class SB3(Record):
             checkpoint: where the training is kept while it is under way, and gone on with; None for nowhere.
         """
         settings = self._settings(env)
-        with _torch_threads(self.threads):
+        with torch_threads(self.threads):
             model = self._model(env, gamma=check_discount(gamma), seed=int(seed), device="cpu", **settings)
             agent = Agent(model, env.states if isinstance(env, TabularVecEnv) and env.shows_rows else None)
             watching = Watching(agent, self.total_timesteps, progress, interval or self.total_timesteps // 100, checkpoint)
@@ -278,7 +278,8 @@ def _batch_size(rollout: int) -> int:
 
 
 @contextlib.contextmanager
-def _torch_threads(threads: int) -> Iterator[None]:
+def torch_threads(threads: int) -> Iterator[None]:
+    """So many threads of torch, in a block."""
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
@@ -289,5 +290,4 @@ def _torch_threads(threads: int) -> Iterator[None]:
 
 def tabular_actions(policy: Policy, states: States) -> Actions:
     """(S,) the action that a policy takes, deterministically, in each state."""
-    actions, _ = policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)
-    return np.asarray(actions).astype(np.int64)
+    return np.asarray(policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)[0]).astype(np.int64)

@@ -2,6 +2,7 @@
 
 For example:
     irl-gym reproduce ng-russell-2000 --quick
+    irl-gym reproduce abbeel-ng-2004 --figure 4
 """
 
 import importlib
@@ -10,7 +11,10 @@ from collections.abc import Sequence
 from irl_gym.commands.terminal import checked_name, print_error
 from irl_gym.errors import InvalidParameter
 
-PAPERS = {"ng-russell-2000": "irl_gym.commands.ng_russell_2000.reproduction"}
+PAPERS = {
+    "ng-russell-2000": "irl_gym.commands.ng_russell_2000.reproduction",
+    "abbeel-ng-2004": "irl_gym.commands.abbeel_ng_2004.reproduction",
+}
 """Name -> the module that reproduces it, with `command`. A further paper is a line here and a folder of its own."""
 
 

@@ -7,14 +7,13 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.facts import Fact, Mood
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.programs.solvers import Status, check_solving
+from irl_gym.programs.status import Status
 from irl_gym.records import Record
 
 
@@ -94,8 +93,9 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
 class Learner(Protocol):
     """Learns from what is known of an expert and a world: a frozen record of hyper-parameters.
 
-    It may say in `how` how its policy comes about, and in `of_feasible_set` that its reward is one of all those under which the
-    expert is optimal, so that these are examined: then it has `r_max` and `reward_on`, as FiniteLP has.
+    It may say in `how` how its policy comes about; in `on_rows` that its policy is one of a table's rows; and in
+    `of_feasible_set` that its reward is one of all those under which the expert is optimal, so that these are examined: then it
+    has `r_max` and `reward_on`, as FiniteLP has.
     """
 
     needs: ClassVar[Needs]
@@ -145,17 +145,3 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [without_nan(one) for one in value]
     return None if isinstance(value, float) and math.isnan(value) else value
-
-
-def check_weighing(learner: Any) -> None:
-    """Check the fields that learners of linear rewards share: penalty, l1, horizon, seed, solver and time_limit.
-
-    Raises:
-        InvalidParameter: one outside its range.
-    """
-    checked_number("penalty", learner.penalty, "a slope of at least 1, such as the paper's 2", least=1)
-    checked_number("l1", learner.l1, "a number of at least 0", least=0)
-    checked_number("seed", learner.seed, "a whole number of at least 0", least=0, whole=True)
-    if learner.horizon is not None:
-        checked_number("horizon", learner.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
-    check_solving(learner.solver, learner.time_limit)

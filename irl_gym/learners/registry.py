@@ -13,6 +13,9 @@ BUILT_IN = {
     "finite-lp": "irl_gym.learners.linear_programs.finite:FiniteLP",
     "feature-lp": "irl_gym.learners.linear_programs.feature:FeatureLP",
     "trajectory-lp": "irl_gym.learners.linear_programs.trajectory:TrajectoryLP",
+    "clone": "irl_gym.learners.cloning.clone:Clone",
+    "softmax-clone": "irl_gym.learners.cloning.softmax:SoftmaxClone",
+    "neural-clone": "irl_gym.agents.neural_clone:NeuralClone",
 }
 """Name on the command line -> where the class is. A new learner is one line here."""
 

@@ -65,7 +65,7 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float |
     except (NotTabular, NotDiscrete) as error:
         if not isinstance(env.action_space, spaces.Discrete):
             raise
-        if "dynamics" in asked.learner.needs.required:
+        if "dynamics" in asked.learner.needs.required or getattr(asked.learner, "on_rows", False):
             raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):

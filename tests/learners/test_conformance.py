@@ -26,9 +26,10 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.tabulate import tabulate
 
-OPTIONS = {"trajectory-lp": {"max_rounds": 2, "trajectories": 20, "horizon": 10}}
+OPTIONS = {"trajectory-lp": {"max_rounds": 2, "trajectories": 20, "horizon": 10}, "neural-clone": {"epochs": 2}}
 """Of learners that would take long."""
-COLUMNS = {"finite-lp": "active", "feature-lp": "active", "trajectory-lp": "active", "own_learners:Dice": "active",
+COLUMNS = {"finite-lp": "active", "feature-lp": "active", "trajectory-lp": "active", "clone": "passive",
+           "softmax-clone": "passive", "neural-clone": "passive", "own_learners:Dice": "active",
            "own_learners:Copycat": "passive"}  # fmt: skip
 every = pytest.mark.parametrize("name", [*BUILT_IN, "own_learners:Dice", "own_learners:Copycat"])
 
@@ -105,9 +106,10 @@ def test_a_part_that_is_required_and_missing_is_one_error(name, whole):
             learned(name, replace(whole, **without))
 
 
-def test_features_of_the_problem_serve_where_the_learner_has_none_and_are_asked_for(whole):
-    with pytest.raises(MissingPart, match="FeatureLP needs features"):
-        learned("feature-lp", replace(whole, features=None))
+@pytest.mark.parametrize("name", ["feature-lp", "softmax-clone"])
+def test_features_of_the_problem_serve_where_the_learner_has_none_and_are_asked_for(name, whole):
+    with pytest.raises(MissingPart, match=f"{learner_class(name).__name__} needs features"):
+        learned(name, replace(whole, features=None))
 
 
 @every

@@ -27,6 +27,8 @@ from irl_gym.judging.ambiguity.uniqueness import optimal_face
 from irl_gym.judging.ambiguity.widths import feasible_widths
 from irl_gym.judging.distances import TableModel, Transitions, epic, sampled_dard, sampled_pearson, sampled_starc, starc
 from irl_gym.judging.distances.bounds import epic_bound
+from irl_gym.learners.cloning.clone import Clone
+from irl_gym.learners.cloning.softmax import SoftmaxClone
 from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -50,6 +52,7 @@ CONTRADICTED, NEAR = partly_contradicted(), Functions(lambda x: (x[:, :1] < 0.2)
 UNKNOWN_LAST = np.array([[1.0, 0.0]] * 4 + [[np.nan] * 2])
 STEPS = {"reward_on": "state-action"}
 R, S = rewards_of(CONTINUING)
+ONCE = np.outer(np.arange(5) < 2, np.arange(3.0))
 
 
 def fit(mdp=MODEL.mdp, expert=MODEL.expert, visits=None, **how):
@@ -58,6 +61,14 @@ def fit(mdp=MODEL.mdp, expert=MODEL.expert, visits=None, **how):
 
 def on_features(features, S_0, mdp, expert):
     return FeatureLP(features, S_0=S_0).fit(mdp, expert)
+
+
+def clone(counts, **how):
+    return Clone(**how).fit(counts, MODEL.mdp)
+
+
+def softmax(**how):
+    return SoftmaxClone(np.eye(5), **how).fit(ONCE)
 
 
 def broken_off(asked):
@@ -175,6 +186,15 @@ CASES = [
     ('expected unvisited="free", or l1 as a number.',
      lambda: fit(expert=PARTLY, l1="auto"),
      lambda: fit(expert=PARTLY, l1="auto", unvisited="free") and fit(expert=PARTLY, l1=0.01)),
+    # clones
+    ("Record more episodes, or use unseen='uniform' or unseen='nearest'.",
+     lambda: clone(ONCE, unseen="refuse"),
+     lambda: clone(np.ones((5, 3)), unseen="refuse") and clone(ONCE, unseen="uniform") and clone(ONCE, unseen="nearest")),
+    ("Give `tabulate(env, gamma=...).mdp`, or use unseen='uniform'.",
+     lambda: Clone(unseen="nearest").fit(ONCE), lambda: clone(ONCE, unseen="nearest") and Clone(unseen="uniform").fit(ONCE)),
+    ("Raise l2, or raise max_iterations.",
+     lambda: softmax(l2=1e-3, max_iterations=3),
+     lambda: softmax(l2=10.0, max_iterations=3) and softmax(l2=1e-3, max_iterations=300)),
     # time
     ("raise time_limit, or choose the other solver.", lambda: hurried(1e-9), lambda: hurried(60.0)),
     ("raise time_limit, or give most_pieces.", lambda: path(time_limit=1e-9), lambda: path(time_limit=60.0, most_pieces=2)),

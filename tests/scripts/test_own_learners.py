@@ -28,6 +28,9 @@ def run(script, monkeypatch, tmp_path):
     [
         ("own_learners:Dice", "retrained", "thrown with 6 sides", 1),
         ("own_learners:Copycat", "learned", "Not examined: the learner gives a policy", 3),
+        ("clone", "learned", "without demonstrations", 3),
+        ("softmax-clone", "learned", "above the least of its class", 3),
+        ("neural-clone", "learned", "its action is another in", 3),
     ],
 )
 def test_a_learner_of_ones_own_goes_through_the_loop_and_its_reports(run, script, tmp_path, name, policy, told, code):
@@ -39,6 +42,16 @@ def test_a_learner_of_ones_own_goes_through_the_loop_and_its_reports(run, script
     assert script("doctor", "--run", "run", cwd=tmp_path).returncode == code
     shutil.copytree(tmp_path / "run", tmp_path / "again")
     assert script("compare", "run", "again", cwd=tmp_path).returncode == 0
+
+
+def test_options_reach_a_clone(run):
+    done = run("clone", "--options", "unseen=near")
+    assert done.returncode == 2 and "unseen is 'near': expected 'uniform', 'nearest' or 'refuse'" in done.stderr
+
+
+def test_a_clone_of_numbered_states_is_refused_before_anything_is_trained_where_there_are_none(run):
+    done = run("clone", "--env-id", "CartPole-v1")
+    assert done.returncode == 2 and "NotDiscrete: no table of CartPole-v1" in " ".join(done.stderr.split())
 
 
 def test_options_reach_a_learner_of_ones_own(run):

@@ -35,11 +35,11 @@ from irl_gym.environments.generative import GenerativeModel, least_horizon, trun
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
-from irl_gym.learners.base import Outcome, check_weighing, featured
+from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.linear_programs.feature_program import NOTHING, SolvedFeatures, solve_features
 from irl_gym.learners.linear_programs.feature_rows import FeatureRows, chosen_states, rows_of_model, rows_of_table
 from irl_gym.learners.linear_programs.proofs.feature_proof import FeatureProof, SampledFeatureProof
-from irl_gym.learners.linear_programs.weights import Weights
+from irl_gym.learners.linear_programs.weights import Weights, check_weighing
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
 from irl_gym.mdp.margins import least_per_state

@@ -27,11 +27,11 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features.feature_maps import FeatureMap, as_features, checked_features
 from irl_gym.features.feature_sums import discounted_sums
 from irl_gym.features.linear_reward import LinearReward
-from irl_gym.learners.base import Outcome, check_weighing, featured
+from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.linear_programs.estimates import Estimate, nearest, usable
 from irl_gym.learners.linear_programs.expressible import uniform_margin
 from irl_gym.learners.linear_programs.proofs.trajectory_proof import TrajectoryProof
-from irl_gym.learners.linear_programs.weights import Rows, Weights, best_weights
+from irl_gym.learners.linear_programs.weights import Rows, Weights, best_weights, check_weighing
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem, World
 from irl_gym.mdp.episodes import Episode

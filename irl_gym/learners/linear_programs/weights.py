@@ -19,13 +19,28 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
+from irl_gym.checks import checked_number
 from irl_gym.features.feature_maps import blocks
 from irl_gym.programs import native
 from irl_gym.programs.killable import called, check_limit
-from irl_gym.programs.solvers import AUTO, Answer, Solving, solve
+from irl_gym.programs.solvers import AUTO, Answer, Solving, check_solving, solve
 
 ROUNDING = 1e-12
 """Singular values of the rows below this, over the largest, are the rounding of values."""
+
+
+def check_weighing(learner: Any) -> None:
+    """Check the fields that learners of linear rewards share: penalty, l1, horizon, seed, solver and time_limit.
+
+    Raises:
+        InvalidParameter: one outside its range.
+    """
+    checked_number("penalty", learner.penalty, "a slope of at least 1, such as the paper's 2", least=1)
+    checked_number("l1", learner.l1, "a number of at least 0", least=0)
+    checked_number("seed", learner.seed, "a whole number of at least 0", least=0, whole=True)
+    if learner.horizon is not None:
+        checked_number("horizon", learner.horizon, "a number of steps of at least 1, or None", least=1, whole=True)
+    check_solving(learner.solver, learner.time_limit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ class Rewarded(Protocol):
         ...
 
 
-AnyReward = RewardFunction | Rewarded | np.ndarray | str | os.PathLike
+Payable = RewardFunction | Rewarded | np.ndarray | str | os.PathLike
 Shaping = Tabulated | TabularMDP | None
 
 
@@ -74,7 +74,7 @@ class LearnedReward(gym.Wrapper, gym.utils.RecordConstructorArgs):
         InvalidMDP: `shaping` is no table.
     """
 
-    def __init__(self, env: gym.Env, reward: AnyReward, states: States | None = None, *, shaping: Shaping = None):
+    def __init__(self, env: gym.Env, reward: Payable, states: States | None = None, *, shaping: Shaping = None):
         reward = os.fspath(reward) if isinstance(reward, os.PathLike) else reward
         gym.utils.RecordConstructorArgs.__init__(self, reward=reward, states=states, shaping=shaping)
         gym.Wrapper.__init__(self, env)
@@ -120,7 +120,7 @@ class VectorLearnedReward(VectorWrapper):
         NotDiscrete, InvalidReward, InvalidMDP: as `LearnedReward`.
     """
 
-    def __init__(self, env: VectorEnv, reward: AnyReward, states: States | None = None, *, shaping: Shaping = None):
+    def __init__(self, env: VectorEnv, reward: Payable, states: States | None = None, *, shaping: Shaping = None):
         super().__init__(env)
         space, actions = env.single_observation_space, env.single_action_space
         self.reward_function, self.states = _prepared(reward, states, shaping, space, actions)

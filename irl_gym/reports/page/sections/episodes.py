@@ -8,7 +8,7 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
-from irl_gym.judging.scores import agent_of, the
+from irl_gym.judging.scores import agent_of, called
 from irl_gym.reports.page.maps import Map, geometry
 from irl_gym.reports.page.sections.absent import EPISODES
 from irl_gym.reports.page.sections.section import Section
@@ -40,7 +40,7 @@ def episodes(films: Mapping[str, Film], place: Map | None, policies: Mapping[str
         "One episode of each, from the same kind of start. Play them, or step with the buttons; the slider below each goes to "
         "any moment."
     )
-    shown = the(agent_of(policies)).removeprefix("the ")
+    shown = called(agent_of(policies))
     titles = {"expert": "Expert", "agent": f"{shown[0].upper()}{shown[1:]}"}
     told = [_told(name, titles.get(name, name), film) for name, film in films.items()]
     return Section(*EPISODES, lead, (), "episodes", {"players": told}, {"episodes": {"players": players}})

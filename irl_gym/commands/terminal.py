@@ -23,10 +23,10 @@ UNSET = arg(help_behavior_hint="")
 """What stands for "not given" is not shown in --help; the text says what happens then."""
 OPTIONS = (OmitArgPrefixes, DisallowNone)
 """How tyro reads arguments: groups of them give no prefix to their flags, and nobody types None."""
-Kind = TypeVar("Kind")
+Options = TypeVar("Options")
 
 
-def read_arguments(kind: type[Kind], words: Sequence[str], subcommand: str, about: str | None) -> Kind:
+def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, about: str | None) -> Options:
     """The arguments of a subcommand, as a record; --help and what cannot be read end the process, as tyro has it.
 
     Args:

@@ -2,11 +2,12 @@
 
 import pytest
 
-from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
+from irl_gym.reports.comparison.compared_runs import lettered
+from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.comparison.pooled import over_seeds, told
 from irl_gym.reports.comparison.ranked import sentence
-from irl_gym.runs.pooling import pools
 from irl_gym.runs.run import read_run
+from irl_gym.runs.supply import supplied
 
 
 @pytest.fixture(scope="module")
@@ -15,19 +16,18 @@ def seeds(policy_run):
 
 
 def test_seeds_of_a_policy_learner_are_one_pool_which_is_called_by_its_policies(seeds):
-    found = pools(seeds)
-    section = over_seeds(found, {"A": "a lake", "B": "a lake"}, same=True)
+    section = supplied(over_seeds, seeds)
     rows = {name: cells for name, *cells in section.shown["rows"]}
-    low, high = sorted(run.metrics["policies"]["learned"]["score"] for run in seeds.values())
+    low, high = sorted(run.metrics["policies"]["learned"]["score"] for run in seeds.runs.values())
     assert rows["score of the learner's policies, worst and best seed"] == [f"{low:.3f} and {high:.3f}"]
     assert rows["learner"] == ["own_learners:Copycat"] and rows["seeds"] == ["0, 1"] and section.panels == []
     assert not any("worst tie" in name or "retrained" in name for name in rows)
-    assert told(found[0]).startswith(f"runs A, B, mean over 2 seeds: score {(low + high) / 2:.3f}")
-    assert sentence(seeds, found).startswith("Over 2 seeds the learner's policies have a score of ")
+    assert told(seeds.pools[0]).startswith(f"runs A, B, mean over 2 seeds: score {(low + high) / 2:.3f}")
+    assert supplied(sentence, seeds).startswith("Over 2 seeds the learner's policies have a score of ")
 
 
 def test_a_policy_learner_is_compared_with_one_that_gives_both(policy_run, seeds, look, tmp_path):
-    runs = [seeds["A"], read_run(policy_run("both"))]
+    runs = [seeds.runs["A"], read_run(policy_run("both"))]
     write_comparison(runs, tmp_path / "page.html")
     page = look(tmp_path / "page.html")
     assert page.wrong == [] and page.locator("#rewards .plot").count() == 1

@@ -5,7 +5,7 @@ from reports.page.made_runs import table_run
 
 from irl_gym.reports.page.report import write_report
 
-BOX = "document.querySelector('[aria-label=\"Where the agent deviates\"]')"
+BOX = "document.querySelector('[aria-label=\"Where the retrained agent deviates\"]')"
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_a_doctor_without_findings_says_what_was_examined(lake, answer, why, tol
     found = section_of(
         doctor, lake, diagnosis={"answer": answer, "why": why, "findings": [], "examined": "Examined: 53 states."}
     )
-    assert found.lead == f"{told} Examined: 53 states."
+    assert found.lead == f"As recorded when the run was made: {told} Examined: 53 states."
 
 
 def test_the_worst_tie_says_of_what_it_loses(lake):

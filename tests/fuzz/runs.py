@@ -45,7 +45,7 @@ def sound_run(folder):
         as_distribution(policy, run.table.mdp.n_states, run.table.mdp.n_actions)
     assert all(one.shape == (16,) for one in run.widths.values()) and run.curve.value.dtype.kind == "f"
     for record in (*run.stages.values(), read_record(folder, "start")) if run.vouched else ():
-        for name, recorded in record["sha256"].items():
+        for name, recorded in record.get("sha256", {}).items():  # a stage of whose files none was read may have lost it
             assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == recorded
 
 

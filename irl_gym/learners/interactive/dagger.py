@@ -4,6 +4,7 @@
               D <- D + {(s, pi*(s)) of these visits}
               pi^_{i+1} = the clone of D, in the class of the cloning learner
     at last   the best of the pi^
+With `labels="clean"` the visits are those of the expert under noise (DART), and the labels its own.
 Best is, where the table is known: of the highest value, exactly, if the reward is known; else with the fewest steps at odds
     odds(pi) = sum_s d_pi(s) (1 - pi(pi*(s) | s)),   a step in a state without a label counting whole,
 which is what the oracle's value is more than pi's at most, in units of the most that one other action costs (its advantage,
@@ -38,6 +39,7 @@ from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex, States
 
 Schedule = Literal["indicator", "linear", "exponential"]
+Whence = Literal["own", "clean"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,7 @@ class Round(Record):
     queries: int
     """So far."""
     mistakes: float
-    """The share of these visits which the policy before, that drove here, labels otherwise: before it learned from them."""
+    """The share of these visits which the policy before labels otherwise: before it learned from them."""
     value: float | None
     """Of the policy, exactly; None where the table or the reward is not known."""
     odds: float | None
@@ -88,22 +90,26 @@ class DAgger:
     discounted, by one sparse solve a round."""
     max_episode_steps: int = 500
     """Longer episodes are cut."""
+    labels: Whence = "own"
+    """Of states to which the mixture comes, more and more the learner's own; or clean ones of states to which the expert comes
+    under `noise`, in every round, whatever beta: the learner never acts (DART; Laskey et al. 2017, with a noise that stays)."""
+    noise: float = 0.1
+    """Of `labels="clean"`: probability of a random action in place of the expert's, between 0 and 1."""
     ask: Asking = "always"
     """Ask at each visit, or only in states in which the oracle has not answered yet; its answer then serves at each visit."""
     needs: ClassVar[Needs] = Needs(("oracle", "dynamics or environment"), ("reward", "features"))
     """The parts of a problem that `learn` reads; the reward only tells which round is the best."""
-    how: ClassVar[str] = "cloned from the oracle's answers where it went itself (DAgger)"
-    """How its policy comes about."""
     on_rows: ClassVar[bool] = True
     """Its policy is one of numbered states, so that without them there is none."""
 
     def __post_init__(self) -> None:
         checked_number("rounds", self.rounds, "a whole number of at least 1", least=1, whole=True)
         checked_number("decay", self.decay, "a number between 0 and 1, such as 0.5", above=0, below=1)
+        checked_number("noise", self.noise, "a number between 0 and 1, such as 0.1", above=0, below=1)
         checked_number("max_episode_steps", self.max_episode_steps, "a whole number of at least 1", least=1, whole=True)
         if self.episodes is not None:
             checked_number("episodes", self.episodes, "a whole number of at least 1, or None", least=1, whole=True)
-        for name, words in (("beta", get_args(Schedule)), ("ask", get_args(Asking))):
+        for name, words in (("beta", get_args(Schedule)), ("ask", get_args(Asking)), ("labels", get_args(Whence))):
             if not is_word(getattr(self, name), *words):
                 raise InvalidParameter(f"{name} is {getattr(self, name)!r:.60}: expected one of {', '.join(words)}.")
         if isinstance(self.learner, str):
@@ -113,8 +119,16 @@ class DAgger:
             what = "one that clones labels of states, Clone(...) or SoftmaxClone(...)"
             raise InvalidParameter(f"the learner is {self.learner!r:.60}: expected {what}.")
 
+    @property
+    def how(self) -> str:
+        """How its policy comes about."""
+        where = "where it went itself (DAgger)" if self.labels == "own" else "where the expert went under noise (DART)"
+        return f"cloned from the oracle's answers {where}"
+
     def share(self, number: int) -> float:
-        """beta_i of round i, from 1."""
+        """The oracle's share of the steps of round i, from 1."""
+        if self.labels == "clean":
+            return 1 - self.noise
         if self.beta == "linear":
             return 1.0 if self.rounds == 1 else 1 - (number - 1) / (self.rounds - 1)
         return float(number == 1) if self.beta == "indicator" else float(self.decay ** (number - 1))
@@ -159,12 +173,12 @@ class DAgger:
         env = self._steppable(known) if mdp is None else None
         labels = Labels(known.oracle, states, A, self.ask)
         visit = self._visiting(mdp, env, states, labels, rng)
-        policy = np.full((states.n_states, A), 1 / A)
+        policy = chance = np.full((states.n_states, A), 1 / A)
         weights = np.zeros(policy.shape)
         try:
             for number in range(1, self.rounds + 1):
                 beta = self.share(number)
-                visits = visit(policy, beta)
+                visits = visit(chance if self.labels == "clean" else policy, beta)
                 weights += visits.aggregated(weights.shape)
                 mistakes = visits.mistakes(policy)
                 policy = np.asarray(learner.fit(weights, mdp, states=known.spaces.states).policy)

@@ -33,7 +33,7 @@ class DaggerProof:
     acting: float | None
     """Discounted steps of the policy; None without a table."""
     mistakes: float
-    """The share of the last round's visits that was labelled otherwise than the policy that drove there would act."""
+    """The share of the last round's visits that was labelled otherwise than the policy before it would act."""
 
     def facts(self) -> tuple[Fact, ...]:
         """What was asked, what is kept, and how it differs from what was answered."""
@@ -59,7 +59,8 @@ class DaggerProof:
         told = f"{self.odds:.4g} of {self.acting:.4g} discounted steps at most ({share:.2%})"
         if self.contradicted:
             return Fact(label, told, "open")
-        return Fact(label, f"{told}; it loses at most that many times what one other action costs", "open")
+        most = "against whoever acts as it answered, this loses at most that many times what one other action costs"
+        return Fact(label, f"{told}; {most}", "open")
 
     def to_json(self) -> dict[str, Any]:
         """As json holds it."""

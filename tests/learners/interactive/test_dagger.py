@@ -83,6 +83,24 @@ def test_what_a_policy_loses_is_at_most_its_odds_times_what_one_other_action_cos
     assert lost <= found.proof.odds * cost + 1e-9
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_clean_labels_are_the_experts_own_where_it_goes_under_noise(seed):
+    model, learner = from_first(random_model(seed)), DAgger(rounds=2, learner=COARSE, labels="clean", noise=0.3)
+    shaken = 0.7 * np.eye(3)[model.expert] + 0.3 / 3
+    for one in learner.iterate(problem(model), rng()):
+        found = np.zeros(7)
+        found[one.visits.states] = one.visits.weights
+        np.testing.assert_allclose(found, occupancy(model.mdp, shaken).sum(axis=1), atol=1e-12)
+        np.testing.assert_array_equal(one.visits.labels, model.expert[one.visits.states])
+
+
+def test_noise_moves_what_is_executed_and_not_the_labels():
+    learner = DAgger(rounds=1, labels="clean", noise=0.3, episodes=200, max_episode_steps=10)
+    (only,) = learner.iterate(problem(random_model(2)), rng())
+    assert (only.visits.executed != only.visits.labels).mean() == pytest.approx(0.3 * 2 / 3, abs=0.03)
+    assert "under noise (DART)" in learner.how and "itself (DAgger)" in DAgger().how
+
+
 def test_a_table_needs_one_round_and_one_answer_a_state_and_ends_where_nothing_is_left_to_learn():
     model = random_model(3)
     found = DAgger(ask="unseen").learn(problem(model), rng())
@@ -223,6 +241,8 @@ def test_a_world_that_cannot_be_stepped_is_refused(lake):
         ({"episodes": 0}, "episodes is 0"),
         ({"max_episode_steps": 0}, "max_episode_steps is 0"),
         ({"beta": "sudden"}, "beta is 'sudden': expected one of indicator, linear, exponential"),
+        ({"noise": 1.0}, "noise is 1.0"),
+        ({"labels": "all"}, "labels is 'all': expected one of own, clean"),
         ({"ask": "never"}, "ask is 'never': expected one of always, unseen"),
         ({"learner": DAgger()}, "expected one that clones labels of states"),
         ({"learner": "finite-lp"}, "expected one that clones labels of states"),

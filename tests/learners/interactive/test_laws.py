@@ -37,7 +37,11 @@ def situations():
 
 
 @pytest.mark.parametrize("T", LOST)
-@pytest.mark.parametrize("options", [{}, {"episodes": 50, "max_episode_steps": 40}], ids=["exactly", "by episodes"])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"episodes": 50, "max_episode_steps": 40}, {"labels": "clean", "noise": 0.05}],
+    ids=["exactly", "by episodes", "clean labels of an expert under noise"],
+)
 def test_dagger_loses_in_the_steps_what_its_class_must(T, options):
     found = DAgger(rounds=4, learner=ONE_FOR_ALL, **options).learn(situations(), np.random.default_rng(0))
     e, loss = 0.01, T - earned(TABLE, PAID, found.policy, T)

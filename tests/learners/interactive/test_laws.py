@@ -103,7 +103,7 @@ def labels_of_a_clone(lake, seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_at_most_60_labels_are_enough_for_the_frozen_lake_where_it_asks_only_in_unseen_states(lake, seed):
     found = labels_until(lake, seed, "unseen")
-    assert found is not None and found <= 60
+    assert found is not None and found <= 60  # 43, 35, 35, 39; of seeds 4 to 7 41, 38, 36, 45
 
 
 def test_with_a_full_table_dagger_that_always_asks_needs_as_many_labels_as_a_clone(lake):

@@ -12,7 +12,7 @@ Which learner needs which, and in which column of Table 1 that puts it, is decla
 Axes: S states, A actions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
@@ -24,14 +24,14 @@ from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.demonstrated import most_frequent, visits
 from irl_gym.environments.generative import GenerativeModel
-from irl_gym.errors import InvalidMDP, InvalidParameter, MissingPart
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, MissingPart
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
 from irl_gym.mdp.policies import Policy, as_distribution, completed
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount
-from irl_gym.records import Record
+from irl_gym.records import Record, short
 from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.tabulation import Tabulation
 
@@ -40,7 +40,7 @@ from irl_gym.tables.tabulation import Tabulation
 class World(Protocol):
     """A world that can be run and solved for a reward; `irl_gym.agents.simulator.Simulator` is one.
 
-    It may have a `limit`, the steps after which it cuts episodes.
+    It may have a `limit`, the steps after which it cuts episodes, and an `env`, of which copies can be stepped.
     """
 
     @property
@@ -61,21 +61,44 @@ class Oracle:
     """An expert that can be asked, observation by observation; it counts its answers.
 
     Args:
-        policy: what answers.
+        policy: what answers: what has `predict`, such as a TabularPolicy or an agent of SB3; or a function
+            `(observation, info) -> action`. Actions count from 0.
+        deterministic: passed to `predict`; False of an expert whose mistakes are drawn.
     """
 
-    def __init__(self, policy: Policy):
-        if not isinstance(policy, Policy):
+    def __init__(self, policy: Policy | Callable[[Any, Mapping[str, Any]], Any], deterministic: bool = True):
+        if not isinstance(policy, Policy) and not callable(policy):
             raise InvalidParameter(
-                f"the oracle's policy is a {type(policy).__name__}: expected one with `predict`. A table of actions is one as "
-                "`TabularPolicy(actions, states)`."
+                f"the oracle's policy is a {type(policy).__name__}: expected one with `predict`, or a function (observation, "
+                "info) -> action. A table of actions is one as `TabularPolicy(actions, states)`."
             )
-        self.policy, self.queries = policy, 0
+        self.policy, self.deterministic, self.queries = policy, deterministic, 0
 
-    def ask(self, observation: Any) -> int:
-        """What the expert does, deterministically; one query more."""
+    def ask(self, observation: Any, info: Mapping[str, Any] | None = None, *, n_actions: int | None = None) -> int:
+        """What the expert does; one query more.
+
+        Args:
+            observation: as the environment shows it.
+            info: what the environment tells besides; None where it is not run.
+            n_actions: A, which the answer is checked against.
+
+        Raises:
+            InvalidPolicy: the answer is no action; it is shown, with the number of the query, from 1, and the observation.
+        """
         self.queries += 1
-        return int(self.policy.predict(observation, deterministic=True)[0])
+        if isinstance(self.policy, Policy):
+            answer = self.policy.predict(observation, deterministic=self.deterministic)[0]
+        else:
+            answer = self.policy(observation, {} if info is None else info)
+        number = np.asarray(answer) if isinstance(answer, int | np.integer | np.ndarray) else np.zeros(0)
+        if number.size == 1 and number.dtype.kind in "iu" and 0 <= (action := int(number.item())):
+            if n_actions is None or action < n_actions:
+                return action
+        last = "" if n_actions is None else f" to {n_actions - 1}"
+        raise InvalidPolicy(
+            f"the oracle's answer to query {self.queries}, observation {short(observation)}, is {answer!r:.80}: expected an "
+            f"action, a whole number from 0{last}."
+        )
 
 
 @dataclass(frozen=True)

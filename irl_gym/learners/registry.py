@@ -16,6 +16,7 @@ BUILT_IN = {
     "clone": "irl_gym.learners.cloning.clone:Clone",
     "softmax-clone": "irl_gym.learners.cloning.softmax:SoftmaxClone",
     "neural-clone": "irl_gym.agents.neural_clone:NeuralClone",
+    "dagger": "irl_gym.learners.interactive.dagger:DAgger",
 }
 """Name on the command line -> where the class is. A new learner is one line here."""
 

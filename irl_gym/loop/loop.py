@@ -218,7 +218,7 @@ class Loop:
             "demonstrations": lambda: self.demonstrations,
             "expert": lambda: None if asked.from_episodes else self.expert,
             "environment": lambda: self.simulator,
-            "oracle": lambda: None if asked.from_episodes else Oracle(world.actor(self.expert, asked.seed)),
+            "oracle": lambda: None if asked.dataset else Oracle(world.actor(self.expert, asked.seed), not asked.epsilon),
             "dynamics": lambda: world.mdp,
             "reward": lambda: world.true,
             "features": lambda: asked.features,

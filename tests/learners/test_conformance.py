@@ -29,7 +29,7 @@ from irl_gym.tables.tabulate import tabulate
 OPTIONS = {"trajectory-lp": {"max_rounds": 2, "trajectories": 20, "horizon": 10}, "neural-clone": {"epochs": 2}}
 """Of learners that would take long."""
 COLUMNS = {"finite-lp": "active", "feature-lp": "active", "trajectory-lp": "active", "clone": "passive",
-           "softmax-clone": "passive", "neural-clone": "passive", "own_learners:Dice": "active",
+           "softmax-clone": "passive", "neural-clone": "passive", "dagger": "interactive", "own_learners:Dice": "active",
            "own_learners:Copycat": "passive"}  # fmt: skip
 every = pytest.mark.parametrize("name", [*BUILT_IN, "own_learners:Dice", "own_learners:Copycat"])
 

@@ -29,6 +29,7 @@ from irl_gym.judging.distances import TableModel, Transitions, epic, sampled_dar
 from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.cloning.softmax import SoftmaxClone
+from irl_gym.learners.interactive.dagger import DAgger
 from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -69,6 +70,13 @@ def clone(counts, **how):
 
 def softmax(**how):
     return SoftmaxClone(np.eye(5), **how).fit(ONCE)
+
+
+def interactive(**how):
+    lake, oracle = gymnasium.make("FrozenLake-v1"), Oracle(lambda seen, info: 1)
+    here = Spaces(lake.observation_space, lake.action_space)
+    known = Problem(here, oracle=oracle, dynamics=GenerativeModel(lake, 0.9))
+    return DAgger(rounds=2, **how).learn(known, np.random.default_rng(0))
 
 
 def broken_off(asked):
@@ -163,6 +171,7 @@ CASES = [
     ("Give the next observations when they are imported.",
      one_step, lambda: one_step(next_observations=[4, 8])),
     ("Ask for a shorter horizon, such as 3.", lambda: broken_off(asked=5), lambda: broken_off(asked=3)),
+    ("Give `episodes`, such as 20.", interactive, lambda: interactive(episodes=20).proof.queries),
     ("Choose a larger S_0.",
      lambda: on_features(OneHot(2), [1], ring([[1, 0], [0, 0]]), FIRST),
      lambda: on_features(OneHot(2), None, ring([[1, 0], [0, 0]]), FIRST)),

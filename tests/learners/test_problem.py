@@ -145,6 +145,25 @@ def test_an_oracle_counts_what_it_is_asked(grid):
     assert [oracle.ask(row) for row in (0, 7, 0)] == [actions[0], actions[7], actions[0]] and oracle.queries == 3
 
 
+@pytest.mark.parametrize("answer", [4, -1, 1.0, True, None, [1, 2], "left"])
+def test_an_answer_that_is_no_action_is_told_with_query_and_observation(answer):
+    oracle = Oracle(lambda seen, info: answer if seen == 7 else 2)
+    assert oracle.ask(3, n_actions=4) == 2
+    with pytest.raises(InvalidPolicy, match=r"answer to query 2, observation 7, is .*: expected an action, .* from 0 to 3"):
+        oracle.ask(7, n_actions=4)
+
+
+def test_an_oracle_that_is_a_function_is_told_what_the_environment_tells():
+    oracle = Oracle(lambda seen, info: info.get("hint", 0))
+    assert [oracle.ask(0, {"hint": np.int64(3)}), oracle.ask(0)] == [3, 0]
+
+
+def test_an_oracle_of_which_mistakes_are_drawn_answers_as_it_acts():
+    states = StateIndex(spaces.Discrete(2))
+    drawn = Oracle(TabularPolicy(np.full((2, 2), 0.5), states), deterministic=False)
+    assert {drawn.ask(0) for _ in range(30)} == {0, 1}
+
+
 def test_an_oracle_that_cannot_answer_is_refused(unchecked):
     with pytest.raises(InvalidParameter, match="policy is a list"):
         Oracle([0, 1])  # type: ignore[arg-type]

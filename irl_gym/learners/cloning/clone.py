@@ -24,6 +24,7 @@ from irl_gym.learners.problem import Problem
 from irl_gym.mdp.episodes import EmpiricalPolicy
 from irl_gym.mdp.tabular_mdp import TransitionTable
 from irl_gym.programs.status import Status
+from irl_gym.spaces.states import States
 
 Elsewhere = Literal["uniform", "nearest", "refuse"]
 
@@ -77,13 +78,16 @@ class Clone:
         discrete_actions(known.spaces.actions)
         return self.fit(known.seen, known.dynamics if isinstance(known.dynamics, TransitionTable) else None)
 
-    def fit(self, seen: EmpiricalPolicy | np.ndarray, table: TransitionTable | None = None, /) -> Outcome[None, CloneProof]:
+    def fit(
+        self, seen: EmpiricalPolicy | np.ndarray, table: TransitionTable | None = None, /, *, states: States | None = None
+    ) -> Outcome[None, CloneProof]:
         """Clone what was seen.
 
         Args:
             seen: how often each action was taken in each state, as `empirical_policy(episodes, states, A)` or, of millions of
                 steps in flat arrays, `counted_pairs(states, actions, S, A)` says; or (S, A) weights, such as an occupancy.
             table: P and d0, which tell what can be reached; None where they are not known.
+            states: not used, since counting needs no observations; `SoftmaxClone.fit` takes it.
 
         Raises:
             InvalidDemonstrations: counts that no episodes could have given, or of another table; or there are none in a state

@@ -12,33 +12,10 @@ from math import comb
 
 import numpy as np
 import pytest
+from mistakes import earned, world
 
 from irl_gym.demonstrations.demonstrated import counted_pairs
 from irl_gym.learners.cloning.clone import Clone
-from irl_gym.mdp.tabular_mdp import TransitionTable
-
-
-def world(right, after_mistake, n_actions):
-    """A table, and what is earned (S, A): 1 for the right action in the good states, which are drawn uniformly."""
-    good = len(right)
-    S = good + 1
-    uniform, last = np.append(np.full(good, 1 / good), 0.0), np.eye(S)[good]
-    P, R = np.zeros((S, n_actions, S)), np.zeros((S, n_actions))
-    P[:good] = last
-    P[np.arange(good), right] = uniform
-    P[good] = uniform if after_mistake == "back" else last
-    R[np.arange(good), right] = 1.0
-    if after_mistake == "back":
-        R[good] = 1.0  # no mistake is made there
-    return TransitionTable.from_dense(P, uniform), R
-
-
-def earned(table, R, policy, T):
-    """Expected undiscounted rewards of T steps, by the law of the state at each."""
-    law, total, paid, P = table.d0, 0.0, (policy * R).sum(axis=1), table.P_pi(policy)
-    for _ in range(T):
-        total, law = total + law @ paid, law @ P
-    return total
 
 
 def situations(after_mistake):

@@ -1,0 +1,230 @@
+"""DAgger, dataset aggregation (Ross, Gordon & Bagnell 2011, algorithm 3.1): clone what the oracle says where the learner goes.
+
+    round i   visits under pi_i = beta_i pi* + (1 - beta_i) pi^_i, drawn anew at each step
+              D <- D + {(s, pi*(s)) of these visits}
+              pi^_{i+1} = the clone of D, in the class of the cloning learner
+    at last   the best of the pi^
+With `labels="clean"` the visits are those of the expert under noise (DART), and the labels its own.
+Best is, where the table is known: of the highest value, exactly, if the reward is known; else with the fewest steps at odds
+    odds(pi) = sum_s d_pi(s) (1 - pi(pi*(s) | s)),   a step in a state without a label counting whole,
+which is what the oracle's value is more than pi's at most, in units of the most that one other action costs (its advantage,
+summed along d_pi). With odds of 0, if it asks only where nothing was answered yet, nothing is left to learn, and it ends.
+Axes: S states, A actions.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, get_args
+
+import gymnasium as gym
+import numpy as np
+
+from irl_gym._typing import Matrix
+from irl_gym.checks import checked_number, discrete_actions, is_word
+from irl_gym.environments.closing import close
+from irl_gym.environments.rollouts import maker_of
+from irl_gym.errors import InvalidParameter
+from irl_gym.learners.base import Outcome, featured
+from irl_gym.learners.cloning.clone import Clone
+from irl_gym.learners.interactive.labels import Asking, Labels
+from irl_gym.learners.interactive.proofs import DaggerProof
+from irl_gym.learners.interactive.visits import LabelledVisits, drawn_visits, exact_visits, reached, stepped_visits
+from irl_gym.learners.needs import Needs
+from irl_gym.learners.problem import Problem
+from irl_gym.learners.registry import learner_of
+from irl_gym.mdp.planning.dynamic_programming import occupancy
+from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs.status import Status
+from irl_gym.records import Record
+from irl_gym.spaces.states import StateIndex, States
+
+Schedule = Literal["indicator", "linear", "exponential"]
+Whence = Literal["own", "clean"]
+
+
+@dataclass(frozen=True, eq=False)
+class Round(Record):
+    """A round: where it came to, and what was learned then."""
+
+    beta: float
+    """Share of the steps in which the oracle's action was taken."""
+    visits: LabelledVisits
+    """What was visited and labelled in this round."""
+    policy: Matrix
+    """(S, A) the clone of all labels so far."""
+    queries: int
+    """So far."""
+    mistakes: float
+    """The share of these visits which the policy before labels otherwise: before it learned from them."""
+    value: float | None
+    """Of the policy, exactly; None where the table or the reward is not known."""
+    odds: float | None
+    """Discounted steps that it is at odds with the oracle, at most; None where there is no table."""
+    acting: float | None
+    """Discounted steps that it makes; None where there is no table."""
+    contradicted: int
+    """States in which the oracle did not always answer the same, so far."""
+    labelled: int
+    """States in which it answered, so far."""
+
+
+@dataclass(frozen=True, eq=False)
+class DAgger:
+    """Dataset aggregation.
+
+    Raises:
+        InvalidParameter: a field outside its range, or a learner that clones no labels of states.
+        UnknownLearner: a learner's name that is none.
+    """
+
+    rounds: int = 10
+    """At most; fewer with `ask="unseen"` where nothing is left to learn."""
+    learner: Any = field(default_factory=Clone)
+    """Clones the labels: `Clone(...)` or `SoftmaxClone(...)`, whose fields make the class; or its name, `softmax-clone`."""
+    beta: Schedule = "indicator"
+    """beta_i: 1 in the first round and 0 later; from 1 to 0 linearly; or decay^(i - 1)."""
+    decay: float = 0.5
+    """Of the exponential schedule, between 0 and 1."""
+    episodes: int | None = None
+    """Episodes a round, of the table or, where there is none, of the environment. None: no episodes, but d exactly, of a table,
+    discounted, by one sparse solve a round."""
+    max_episode_steps: int = 500
+    """Longer episodes are cut."""
+    labels: Whence = "own"
+    """Of states to which the mixture comes, more and more the learner's own; or clean ones of states to which the expert comes
+    under `noise`, in every round, whatever beta: the learner never acts (DART; Laskey et al. 2017, with a noise that stays)."""
+    noise: float = 0.1
+    """Of `labels="clean"`: probability of a random action in place of the expert's, between 0 and 1."""
+    ask: Asking = "always"
+    """Ask at each visit, or only in states in which the oracle has not answered yet; its answer then serves at each visit."""
+    needs: ClassVar[Needs] = Needs(("oracle", "dynamics or environment"), ("reward", "features"))
+    """The parts of a problem that `learn` reads; the reward only tells which round is the best."""
+    on_rows: ClassVar[bool] = True
+    """Its policy is one of numbered states, so that without them there is none."""
+
+    def __post_init__(self) -> None:
+        checked_number("rounds", self.rounds, "a whole number of at least 1", least=1, whole=True)
+        checked_number("decay", self.decay, "a number between 0 and 1, such as 0.5", above=0, below=1)
+        checked_number("noise", self.noise, "a number between 0 and 1, such as 0.1", above=0, below=1)
+        checked_number("max_episode_steps", self.max_episode_steps, "a whole number of at least 1", least=1, whole=True)
+        if self.episodes is not None:
+            checked_number("episodes", self.episodes, "a whole number of at least 1, or None", least=1, whole=True)
+        for name, words in (("beta", get_args(Schedule)), ("ask", get_args(Asking)), ("labels", get_args(Whence))):
+            if not is_word(getattr(self, name), *words):
+                raise InvalidParameter(f"{name} is {getattr(self, name)!r:.60}: expected one of {', '.join(words)}.")
+        if isinstance(self.learner, str):
+            object.__setattr__(self, "learner", learner_of(self.learner, {}))
+        needs, fit, on_rows = (getattr(self.learner, name, None) for name in ("needs", "fit", "on_rows"))
+        if not (isinstance(needs, Needs) and needs.column == "passive" and callable(fit) and on_rows):
+            what = "one that clones labels of states, Clone(...) or SoftmaxClone(...)"
+            raise InvalidParameter(f"the learner is {self.learner!r:.60}: expected {what}.")
+
+    @property
+    def how(self) -> str:
+        """How its policy comes about."""
+        where = "where it went itself (DAgger)" if self.labels == "own" else "where the expert went under noise (DART)"
+        return f"cloned from the oracle's answers {where}"
+
+    def share(self, number: int) -> float:
+        """The oracle's share of the steps of round i, from 1."""
+        if self.labels == "clean":
+            return 1 - self.noise
+        if self.beta == "linear":
+            return 1.0 if self.rounds == 1 else 1 - (number - 1) / (self.rounds - 1)
+        return float(number == 1) if self.beta == "indicator" else float(self.decay ** (number - 1))
+
+    def learn(self, problem: Problem, rng: np.random.Generator) -> Outcome[None, DaggerProof]:
+        """The best round's policy (S, A).
+
+        Args:
+            problem: with an oracle, and a table or an environment; with features, if the learner is to have the problem's.
+            rng: of episodes.
+
+        Raises:
+            MissingPart: one of these is not there.
+            NotDiscrete: observations that cannot be numbered, or actions that are not one number.
+            InvalidParameter: no table, and no number of episodes.
+            InvalidPolicy: the oracle's answer is no action.
+        """
+        played = [*self.iterate(problem, rng)]
+        by, merits = "last", np.arange(len(played), dtype=float)
+        if played[0].value is not None:
+            by, merits = "value", np.array([one.value for one in played], dtype=float)
+        elif played[0].odds is not None:
+            by, merits = "odds", -np.array([one.odds for one in played], dtype=float)
+        best = int(merits.argmax())
+        kept, last = played[best], played[-1]
+        proof = DaggerProof(
+            last.queries, len(played), int(self.rounds), last.labelled, last.contradicted,
+            None if self.episodes is None else sum(one.visits.states.size for one in played), best + 1, by, kept.value,
+            kept.odds, kept.acting, last.mistakes,
+        )  # fmt: skip
+        each = ("beta", "queries", "mistakes", "value", "odds")
+        stats = {"rounds": [{name: getattr(one, name) for name in each} for one in played]}
+        return Outcome(None, Status.LEARNED, proof, stats, kept.policy)
+
+    def iterate(self, problem: Problem, rng: np.random.Generator) -> Iterator[Round]:
+        """A round at a time; arguments and errors as `learn`."""
+        known: Any = self.needs.of(problem, self)
+        learner = featured(self.learner, problem) if "features" in self.learner.needs.parts else self.learner
+        A = int(discrete_actions(known.spaces.actions).n)
+        states = known.spaces.states or StateIndex(known.spaces.observations)
+        mdp = known.dynamics if isinstance(known.dynamics, TabularMDP) else None
+        env = self._steppable(known) if mdp is None else None
+        labels = Labels(known.oracle, states, A, self.ask)
+        visit = self._visiting(mdp, env, states, labels, rng)
+        policy = chance = np.full((states.n_states, A), 1 / A)
+        weights = np.zeros(policy.shape)
+        try:
+            for number in range(1, self.rounds + 1):
+                beta = self.share(number)
+                visits = visit(chance if self.labels == "clean" else policy, beta)
+                weights += visits.aggregated(weights.shape)
+                mistakes = visits.mistakes(policy)
+                policy = np.asarray(learner.fit(weights, mdp, states=known.spaces.states).policy)
+                judged = (None, None, None) if mdp is None else _judged(mdp, policy, known.reward, labels.shares)
+                labelled = int(labels.counts.any(axis=1).sum())
+                yield Round(beta, visits, policy, labels.queries, mistakes, *judged, labels.contradicted, labelled)
+                if judged[1] == 0 and self.ask == "unseen":
+                    return
+        finally:
+            if env is not None:
+                close(env)
+
+    def _visiting(
+        self, mdp: TabularMDP | None, env: gym.Env | None, states: States, labels: Labels, rng: np.random.Generator
+    ) -> Callable[[Matrix, float], LabelledVisits]:
+        """What plays a round: of a policy and beta."""
+        n, most = self.episodes, self.max_episode_steps
+        if env is not None and n is not None:
+            return lambda policy, beta: stepped_visits(env, states, policy, beta, labels, n, most, rng)
+        assert mdp is not None
+        if n is not None:
+            return lambda policy, beta: drawn_visits(mdp, policy, beta, labels, n, most, rng)
+        return lambda policy, beta: exact_visits(mdp, policy, beta, labels)
+
+    def _steppable(self, known: Problem) -> gym.Env:
+        """A copy of the environment of a problem without a table.
+
+        Raises:
+            InvalidParameter: the world has none, or the number of episodes is missing.
+        """
+        world = known.environment if known.dynamics is None else known.dynamics
+        env = getattr(world, "env", None)
+        if not isinstance(env, gym.Env):
+            raise InvalidParameter(
+                f"the environment is a {type(world).__name__} without `env`: expected one that can be stepped."
+            )
+        if self.episodes is None:
+            raise InvalidParameter(
+                "episodes is None, and there is no table: expected a number of episodes a round. Give `episodes`, such as 20."
+            )
+        return maker_of(env)()
+
+
+def _judged(mdp: TabularMDP, policy: Matrix, reward: Any, shares: Matrix) -> tuple[float | None, float, float]:
+    """Value, None without a reward; discounted steps at odds with the oracle, at most; and all discounted steps."""
+    mu = np.maximum(occupancy(mdp, policy), 0.0) * reached(mdp, lambda rows: policy[rows])[:, None]
+    visits = mu.sum(axis=1)
+    odds = float(visits @ np.maximum(1 - (policy * shares).sum(axis=1), 0.0))
+    return None if reward is None else float((mu * reward.expected(mdp)).sum()), odds, float(visits.sum())

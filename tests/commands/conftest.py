@@ -1,5 +1,6 @@
 """The command `irl-gym` in this process, and a folder with a user's own modules."""
 
+import re
 import sys
 from types import SimpleNamespace
 
@@ -30,6 +31,9 @@ class Twin:
 """,
 }
 
+STAGE = re.compile(r"[a-z0-9 ]+: (begun|done in |\d+ ?%|\d+ s, |[\d.]+ s)")
+"""How a line begins that says how far a stage is."""
+
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
@@ -46,7 +50,7 @@ def here(tmp_path, monkeypatch):
 
 @pytest.fixture
 def irl_gym(here, capsys, monkeypatch, unchecked):
-    """The command: what it returns and says. Runs draw no figures, which take the time."""
+    """The command: what it returns and says, but for how far its stages are. Runs draw no figures, which take the time."""
     from irl_gym.commands import door  # here, so that the filter of pytest_configure is in force
     from irl_gym.loop import loop
 
@@ -58,6 +62,7 @@ def irl_gym(here, capsys, monkeypatch, unchecked):
         except SystemExit as ended:
             code = ended.code or 0
         said = capsys.readouterr()
-        return SimpleNamespace(code=code, out=said.out, errors=said.err)
+        told = [line for line in said.err.splitlines(keepends=True) if not STAGE.match(line)]
+        return SimpleNamespace(code=code, out=said.out, errors="".join(told))
 
     return call

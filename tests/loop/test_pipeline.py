@@ -68,7 +68,7 @@ def test_a_run_leaves_what_its_own_agent_is_paid(report):
         tabulate(gym.make("FrozenLake-v1", is_slippery=False), gamma=0.99),
     )
     paid = ShapedReward.load(report.out / "reward_shaped.npz")
-    clip = json.loads((report.out / "certificate.json").read_text())["proof"]["margin_cap"]
+    clip = json.loads((report.out / "certificate.json").read_text())["proof"]["terms"]["margin_cap"]
     assert np.array_equal(paid.values, ExpectedAdvantage(clip).apply(reward, table.mdp).values)
 
 

@@ -125,6 +125,8 @@ CASES = [
      lambda _: asked("--max-states", "9", "--table", "sample"), lambda _: asked("--steps", "9", "--table", "sample")),
     ("such as step_count=100, or", lambda _: asked("--reveal", "step_count"), lambda _: asked("--reveal", "step_count=100")),
     ("such as last=[None,0,1]; or", lambda _: asked("--reveal", "last=None"), lambda _: asked("--reveal", "last=[None,0,1]")),
+    ("Leave one out.", lambda _: asked("--reveal", "step_count=9", "step_count=100"),
+     lambda _: asked("--reveal", "step_count=100")),
     ("or known, or none.", lambda _: asked("--reveal", "all"), lambda _: asked("--reveal", "none").reveal == {}),
     ("expected name=value, such as map_name=8x8.",
      lambda _: asked("--env-kwargs", "8x8"), lambda _: asked("--env-kwargs", "map_name=8x8").env_kwargs == {"map_name": "8x8"}),

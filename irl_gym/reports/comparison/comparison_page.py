@@ -27,9 +27,9 @@ from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.scene import Scene
 from irl_gym.reports.page.sections import compared
 from irl_gym.reports.page.sections.asked import written
+from irl_gym.reports.page.sections.judged import answer, how
 from irl_gym.reports.page.sections.proof import finding
 from irl_gym.reports.page.sections.section import Section, specs
-from irl_gym.reports.page.sections.verdict import answer, how
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.run import Run
 from irl_gym.runs.supply import supplied

@@ -23,7 +23,7 @@ from irl_gym.runs.run import Run
 from irl_gym.runs.supply import missing, supplied
 from irl_gym.written import seconds
 
-SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
+SCRIPTS = ("theme.js", "figures.js", "enlarge.js", "slider.js", "episodes.js")
 STAGES_LEAD = (
     "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
     "neither is timed here."

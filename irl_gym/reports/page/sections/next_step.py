@@ -100,7 +100,7 @@ def _use_policy(path: Path, table: Tabulation | None) -> dict[str, Any]:
     """Act by it."""
     if table is None or not (path / POLICY).is_file():
         return _told("Use the policy", "It lies in this run's folder.", None)
-    told = "In this run's folder these lines read it: an action of each state, or probabilities of actions."
+    told = "These lines, run in this run's folder, read the policy: an action of each state, or probabilities of actions."
     lines = f"from irl_gym.mdp.policies import load_actions\n\npolicy = load_actions({POLICY!r})"
     return {"answer": "Use the policy", "sentence": told, "lines": lines}
 

@@ -141,7 +141,7 @@ def _trusted(
     """Is the reward to be trusted? Yes only where all of it was looked at on an exact table, and nothing is against it."""
     reward, share = metrics["reward"], metrics["reward"].get("worst_tie_regret_share")
     said = _said(diagnosis)
-    if "expert_optimal" not in reward:
+    if metrics.get("table") is None or "expert_optimal" not in reward:
         none = "Without a table it is not known of all policies what the reward makes of them."
         return Told("Not decided", "open", (none, _own_words(certificate), said))
     optimal, record = reward["expert_optimal"], "" if recomputed else ", by the run's own record"

@@ -46,8 +46,8 @@ def next_step(
     share = metrics["reward"].get("worst_tie_regret_share")
     if (told := training_fell_short(metrics["policies"], metrics.get("table"), share)) is not None:
         exactly = mended(command, ["--retrain value-iteration"]) if command else None
-        sentence = f"{told}: it is the training that fell short. Train for longer, or plan exactly under the reward."
-        return _told("Train the agent better", f"{sentence} {AGAIN if exactly else ''}", exactly)
+        instead = ". This command plans exactly under the reward instead:" if exactly else "."
+        return _told("Train the agent better", f"{told}: it is the training that fell short{instead}", exactly)
     if not rewarded:
         return _use_policy(path, table)
     healthy = diagnosis is not None and diagnosis["answer"] == "healthy"
@@ -100,7 +100,7 @@ def _use_policy(path: Path, table: Tabulation | None) -> dict[str, Any]:
     """Act by it."""
     if table is None or not (path / POLICY).is_file():
         return _told("Use the policy", "It lies in this run's folder.", None)
-    told = "These lines, run in this run's folder, read the policy: an action of each state, or probabilities of actions."
+    told = f"It lies in {POLICY} in this run's folder: there these lines give each state's action, or probabilities of actions."
     lines = f"from irl_gym.mdp.policies import load_actions\n\npolicy = load_actions({POLICY!r})"
     return {"answer": "Use the policy", "sentence": told, "lines": lines}
 

@@ -109,7 +109,8 @@ def reward_lines(config: Mapping[str, Any], file: str, states: States | None) ->
         return None
     imports, made = ["from irl_gym import LearnedReward"], f"gym.make({repr(env_id) + _arguments(kwargs)})"
     seeds, shown = config.get("start_seeds"), config.get("reveal", KNOWN)
-    added = isinstance(getattr(states, "space", None), spaces.Dict) and OBSERVATION in states.space.spaces  # by Reveal
+    space = getattr(states, "space", None)
+    added = isinstance(space, spaces.Dict) and OBSERVATION in space.spaces  # by Reveal
     if seeds or added or shown not in (KNOWN, {}):
         more = {"start_seeds": seeds or [], "reveal": shown}
         imports.append("from irl_gym.runs.named_parts import environment_of")

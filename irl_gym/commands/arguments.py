@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
 from irl_gym.commands.csv_columns import Log
-from irl_gym.commands.learning_arguments import TAKEN, Learning
+from irl_gym.commands.learning_arguments import Learning
 from irl_gym.commands.terminal import UNSET
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.errors import InvalidParameter
-from irl_gym.runs.choices import KNOWN, PlannerName, Reveals
+from irl_gym.runs.choices import KNOWN, TAKEN, PlannerName, Reveals
 
 if TYPE_CHECKING:
     from irl_gym.agents.planners import Planner

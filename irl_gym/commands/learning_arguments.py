@@ -7,7 +7,7 @@ from tyro.conf import Suppress
 
 from irl_gym.commands.terminal import UNSET
 from irl_gym.errors import InvalidParameter
-from irl_gym.runs.choices import FeatureName, PlannerName
+from irl_gym.runs.choices import TAKEN, FeatureName, PlannerName
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -107,12 +107,6 @@ class Learning:
         return TrajectoryLP(phi, gap_cap=gap_cap, l1=l1, max_rounds=rounds, seed=seed, time_limit=self.time_limit)
 
 
-TAKEN = {
-    "finite-lp": ("l1", "margin_cap", "slack", "reward_on", "time_limit"),
-    "feature-lp": ("l1", "margin_cap", "features", "size", "coordinates", "sample", "time_limit"),
-    "trajectory-lp": ("l1", "features", "size", "coordinates", "rounds", "gap_cap", "inner", "time_limit"),
-}
-"""The options that each learner has; another is refused, not ignored."""
 OF_PART = {"features": ("features", "size", "coordinates"), "environment": ("inner",)}
 """The options that make a part of the problem."""
 

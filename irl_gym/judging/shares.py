@@ -15,6 +15,7 @@ left *open*. Mean returns make no scale, and do not count, where the expert's is
 they differ by is not known to a quarter (`scores.BLUR`). If the score is that of an estimated table, nothing is judged then.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -156,3 +157,17 @@ def _below(share: float | None) -> str:
     """A share with three decimals, which says 0.900 only of what is as much."""
     text = score_of(share)
     return f"just below {GOOD:g}" if share is not None and share < GOOD and text == f"{GOOD:.3f}" else text
+
+
+def training_fell_short(policies: Mapping[str, Any], table: Mapping[str, Any] | None, lost: float | None) -> str | None:
+    """Where every policy that is best under the reward is good, and the agent is not: that sentence; else None.
+
+    Args:
+        policies: the rows of metrics.json.
+        table: its entry of that name; None where there is no table.
+        lost: the share that the worst tie loses; None where that is not known.
+    """
+    if judged(policies, table).mood != "bad" or lost is None or lost > MUCH or not (table or {}).get("exact"):
+        return None
+    least = math.floor(1000 * (1 - lost)) / 1000
+    return f"Every policy that is best under the reward has a score of at least {least:.3f}"

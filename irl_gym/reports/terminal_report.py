@@ -1,6 +1,5 @@
 """A run in a few tables a person reads, for the terminal."""
 
-import math
 import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -19,7 +18,7 @@ from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.estimated import errors_told
 from irl_gym.judging.measures import explained, no_score, shown
 from irl_gym.judging.scores import EXPERT, REFERENCES, RETRAINED
-from irl_gym.judging.shares import MUCH, judged, judgements
+from irl_gym.judging.shares import judged, judgements, training_fell_short
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.identity import ENVIRONMENT
 from irl_gym.runs.scorecard import resumed_told
@@ -122,12 +121,9 @@ def _policies(metrics: Mapping[str, Any]) -> Table:
 
 def _of_training(metrics: Mapping[str, Any]) -> str:
     """Where every policy that is best under the reward is good, and the agent is not, what to do."""
-    table, share = metrics["table"], metrics["reward"].get("worst_tie_regret_share")
-    if judged(metrics["policies"], table).mood != "bad" or share is None or share > MUCH or not table["exact"]:
-        return ""
-    least = math.floor(1000 * (1 - share)) / 1000
-    told = f"Every policy that is best under the reward has a score of at least {least:.3f}"
-    return f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
+    share = metrics["reward"].get("worst_tie_regret_share")
+    told = training_fell_short(metrics["policies"], metrics["table"], share)
+    return "" if told is None else f"\n{told}: try more --total-timesteps, or --retrain value-iteration."
 
 
 def _table(table: Mapping[str, Any]) -> str:

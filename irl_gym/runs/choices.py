@@ -7,3 +7,9 @@ PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 Reveals = Mapping[str, int | Sequence[Any]] | Literal["known"]
 KNOWN: Literal["known"] = "known"
+TAKEN: Mapping[str, tuple[str, ...]] = {
+    "finite-lp": ("l1", "margin_cap", "slack", "reward_on", "time_limit"),
+    "feature-lp": ("l1", "margin_cap", "features", "size", "coordinates", "sample", "time_limit"),
+    "trajectory-lp": ("l1", "features", "size", "coordinates", "rounds", "gap_cap", "inner", "time_limit"),
+}
+"""The options that each learner has; another is refused, not ignored."""

@@ -29,6 +29,7 @@ from irl_gym.files.run_folder import (
     write_json,
     write_record,
 )
+from irl_gym.runs.choices import TAKEN
 from irl_gym.spaces.names import action_names
 from irl_gym.tables.table_files import TABLE, UNDER_WAY
 
@@ -41,6 +42,8 @@ STAGES = (*FIRST, "record", "ambiguity", "report")
 VERSION, ENVIRONMENT = "run.json", "environment.json"
 PROGRAM = ["irl-gym", "run"]
 """How a run's command begins, unless another program started it: this works wherever irl_gym is installed."""
+SWITCHES = {"--shaping": "--no-shaping"}
+"""Flags of mends that have no value, and their opposites."""
 NEW_FOLDER = "runs/again"
 """The folder of a run that is made again."""
 
@@ -144,15 +147,49 @@ def into_folder(command: Sequence[str], folder: str = NEW_FOLDER) -> list[str]:
 
 
 def without(command: Sequence[str], *flags: str) -> list[str]:
-    """The command without some flags that have one value each."""
+    """The command without some flags and their values, which go on to the next flag."""
     kept: list[str] = []
     skipped = False
     for word in map(str, command):
-        flag = flag_of(word)
-        if not skipped and flag not in flags:
+        if word.startswith("--"):
+            skipped = flag_of(word) in flags
+        if not skipped:
             kept.append(word)
-        skipped = flag in flags and "=" not in word
     return kept
+
+
+def mended(command: Sequence[str], flags: Sequence[str]) -> list[str] | None:
+    """A command of `irl-gym run` with the flags of a mend in place of its own, in a folder that the run chooses.
+
+    Args:
+        command: of the run.
+        flags: such as "--l1 0", as a `Finding` has them.
+
+    Returns:
+        The command; None where a flag is still without its value, or the learner has no such option.
+    """
+    given = {flag: values for flag, *values in map(str.split, flags)}
+    if not given or any(not values and flag not in SWITCHES for flag, values in given.items()):
+        return None
+    before = _learner_of(command)
+    learner = given.get("--learner", [before])[0]
+    own = {f"--{name.replace('_', '-')}" for name in TAKEN.get(learner, ())}
+    others = {f"--{name.replace('_', '-')}" for names in TAKEN.values() for name in names} - own
+    if others & set(given):
+        return None
+    replaced = {*given, "--out", *(SWITCHES[flag] for flag in given if flag in SWITCHES)}
+    if learner != before:
+        replaced |= {*others, "--options"}
+    return [*without(command, *replaced), *(word for flag, values in given.items() for word in (flag, *values))]
+
+
+def _learner_of(command: Sequence[str]) -> str:
+    """The learner that a command names, or leaves as it is."""
+    words = [*map(str, command)]
+    for word, after in zip(words, [*words[1:], ""], strict=True):
+        if flag_of(word) == "--learner":
+            return word.partition("=")[2] or after
+    return "finite-lp"
 
 
 def ours(command: Sequence[str]) -> bool:

@@ -3,7 +3,7 @@
 A single seed says little of a method (Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the Statistical
 Precipice"). Runs with the same configuration are one pool, with one run a seed. Pools that differ in their environment alone
 are taken together once more, by their scores: what varies is the seeds within each environment.
-Axes: T pools, n seeds, p points of a learning curve.
+Axes: T pools, n seeds.
 """
 
 import json
@@ -91,15 +91,6 @@ class Pool:
         table = self.first.metrics.get("table") or {}
         means = (self.mean_returns[one] for one in (name, EXPERT, RANDOM))
         return judge(self.score_of(name), *means, estimated=not table.get("exact", True))
-
-    @cached_property
-    def curve(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """(p,) environment steps and (p, 3) interquartile mean of the value with its interval; None where steps differ."""
-        steps = [run.curve.steps for run in self.runs.values()]
-        if not len(steps[0]) or any(not np.array_equal(one, steps[0]) for one in steps):
-            return None
-        values = np.stack([run.curve.value for run in self.runs.values()])
-        return steps[0], np.array([over_seeds(column) for column in values.T])
 
 
 def over_seeds(values: np.ndarray) -> Interval:

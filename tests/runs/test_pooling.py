@@ -98,24 +98,3 @@ def test_pools_without_a_score_are_left_out_of_the_average(made):
     runs = [made(seed, score, env_id=env_id) for env_id, score in (("X", 0.5), ("Y", None), ("Z", 0.7)) for seed in range(2)]
     ((several, score),) = over_environments(pools(lettered(*runs)))
     assert [pool.first.config["env_id"] for pool in several] == ["X", "Z"] and score.estimate == pytest.approx(0.6)
-
-
-def test_the_curve_of_a_pool_is_the_mean_of_its_seeds_at_each_step(made):
-    (pool,) = pools(lettered(*(made(seed, value=(seed, 2.0 * seed, 5.0)) for seed in range(4))))
-    steps, found = pool.curve
-    assert np.array_equal(steps, STEPS) and found[:, 0].tolist() == [1.5, 3.0, 5.0]
-    assert (found[:2, 1] < found[:2, 0]).all() and (found[:2, 0] < found[:2, 2]).all()
-    assert found[2, 0] == 5.0 and np.isnan(found[2, 1:]).all()
-
-
-@pytest.mark.parametrize(
-    "other", [{"steps": [0.0, 1.0, 2.0]}, {"steps": [0.0, 30_000], "value": (1.0, 2.0)}, {"steps": [], "value": ()}]
-)
-def test_a_pool_has_no_curve_when_steps_differ(made, other):
-    (pool,) = pools(lettered(made(0), made(1, **other)))
-    assert pool.curve is None
-
-
-def test_a_pool_of_planned_agents_has_no_curve(made):
-    (pool,) = pools(lettered(*(made(seed, steps=[], value=()) for seed in range(2))))
-    assert pool.curve is None

@@ -5,7 +5,7 @@ in one figure, as scores where the environments differ.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -21,24 +21,23 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.reports.comparison.compared_runs import ComparedRuns, lettered
 from irl_gym.reports.comparison.pooled import over_seeds
 from irl_gym.reports.comparison.ranked import learning, sentence
+from irl_gym.reports.comparison.runs_as_rows import NONE, runs_as_rows
 from irl_gym.reports.comparison.shared_worlds import run_title
 from irl_gym.reports.page.document import write_page
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.scene import Scene
 from irl_gym.reports.page.sections import compared
 from irl_gym.reports.page.sections.asked import written
+from irl_gym.reports.page.sections.judged import answer, how
 from irl_gym.reports.page.sections.proof import finding
 from irl_gym.reports.page.sections.section import Section, specs
-from irl_gym.reports.page.sections.verdict import answer, how
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.run import Run
 from irl_gym.runs.supply import supplied
 from irl_gym.written import counted, seconds, sentence_of
 
-SCRIPTS = ("theme.js", "figures.js")
+SCRIPTS = ("theme.js", "figures.js", "enlarge.js")
 MOST_RUNS = 26
-NONE = "not there"
-"""In place of an empty cell: the run has no such number."""
 
 
 def write_comparison(runs: Sequence[Run], path: str | os.PathLike) -> None:
@@ -74,23 +73,21 @@ def results(
     metrics: Mapping[str, Mapping[str, Any]], stages: Mapping[str, Mapping[str, Mapping[str, Any]]],
     recomputed: Mapping[str, bool], places: Mapping[str, str],
 ) -> Section:  # fmt: skip
-    """One row a number, one column a run."""
+    """One row a run."""
     told = shown(measures.POLICIES, [row for one in metrics.values() for row in one["policies"].values()])
-    columns = [
-        {
+    rows = {
+        letter: {
             "environment": places[letter],
             **dict(_numbers(one, told, recomputed=recomputed[letter])),
             "time of all stages": _time(stages[letter]),
         }
         for letter, one in metrics.items()
-    ]
-    keys = list(dict.fromkeys(key for column in columns for key in column))
-    rows = [[key, *(column.get(key, NONE) for column in columns)] for key in keys]
+    }
     lead = [
         "Every number is under the true reward of its own environment.",
         *_explained([*metrics.values()]),
     ]
-    return _table("results", "Results", " ".join(map(sentence_of, lead)), metrics, rows)
+    return _table("results", "Results", " ".join(map(sentence_of, lead)), rows)
 
 
 def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -102,8 +99,9 @@ def _explained(told: Sequence[Mapping[str, Any]]) -> list[str]:
     return [one for one in each[0] if all(one in other for other in each)]
 
 
-def _table(name: str, title: str, lead: str, letters: Iterable[str], rows: list[list[str]]) -> Section:
-    shown = {"caption": title, "headings": ["", *(f"run {letter}" for letter in letters)], "rows": rows}
+def _table(name: str, title: str, lead: str, told: Mapping[str, Mapping[str, str]]) -> Section:
+    """A section of a table, of what there is to say of each run by its letter."""
+    shown = runs_as_rows(title, {f"run {letter}": one for letter, one in told.items()})
     return Section(name, title, lead, (), "compare", shown)
 
 
@@ -142,21 +140,40 @@ def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed:
 def rewards(
     learned: Mapping[str, TabularReward | LinearReward | None], scenes: Mapping[str, Scene | None], places: Mapping[str, str]
 ) -> Section | None:
-    """The learned rewards, and once each environment's true one."""
+    """The learned rewards; one that several runs learned is drawn once."""
     made: list[Panel] = []
-    for letter, reward in learned.items():
-        scene = scenes[letter]
-        if reward is None:
-            continue
-        if scene is None or scene.learned is None:
+    for letters, reward in _different(learned, scenes, places):
+        letter = letters[0]
+        whose = f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}"
+        if (scene := scenes[letter]) is None or scene.learned is None:
             section = compared.weights(reward)
-            made += [replace(one, name=f"reward-{letter}", title=f"Run {letter}: weights") for one in section.panels]
+            made += [replace(one, name=f"reward-{letter}", title=f"{whose}: weights") for one in section.panels]
         else:
-            made.append(compared.reward_panel(f"reward-{letter}", f"Run {letter}: {places[letter]}", scene.learned, scene))
+            made.append(compared.reward_panel(f"reward-{letter}", f"{whose}: {places[letter]}", scene.learned, scene))
     if not made:
         return None
     lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
+    lead += (
+        " Runs that recovered the same have one figure." if len(made) < sum(one is not None for one in learned.values()) else ""
+    )
     return Section("rewards", "Learned rewards", lead, made)
+
+
+def _different(
+    learned: Mapping[str, TabularReward | LinearReward | None], scenes: Mapping[str, Scene | None], places: Mapping[str, str]
+) -> list[tuple[list[str], TabularReward | LinearReward]]:
+    """Each reward once, to the last digit, with the letters of the runs of one environment that learned it."""
+    found: dict[Any, tuple[list[str], TabularReward | LinearReward]] = {}
+    for letter, reward in learned.items():
+        if reward is None:
+            continue
+        scene = scenes[letter]
+        if scene is not None and scene.learned is not None:
+            key: Any = (places[letter], scene.learned.values.shape, scene.learned.values.tobytes())
+        else:  # features that only look alike are drawn by themselves
+            key = letter
+        found.setdefault(key, ([], reward))[0].append(letter)
+    return [*found.values()]
 
 
 def policies(scenes: Mapping[str, Scene | None]) -> Section | None:
@@ -178,14 +195,13 @@ def differences(configs: Mapping[str, Mapping[str, Any]]) -> Section:
     """What differs between the configurations."""
     flat = [dict(_leaves(config)) for config in configs.values()]
     keys = _entries(flat)
-    rows = [[key, *(_entry(one, key) for one in flat)] for key in keys if not _alike(key, flat)]
-    if not rows:
+    differ = [key for key in keys if not _alike(key, flat)]
+    if not differ:
         return Section("differences", "What differs", "The runs have the same configuration.")
-    told = (
-        f"{counted(len(rows), 'entry differs', 'entries differ')}; the other {len(keys) - len(rows)} are the same in all runs"
-    )
-    lead = f"Of the configuration {told}."
-    return _table("differences", "What differs", lead, configs, rows)
+    told = counted(len(differ), "entry differs", "entries differ")
+    lead = f"Of the configuration {told}; the other {len(keys) - len(differ)} are the same in all runs."
+    rows = {letter: {key: _entry(one, key) for key in differ} for letter, one in zip(configs, flat, strict=True)}
+    return _table("differences", "What differs", lead, rows)
 
 
 def _entries(flat: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -217,17 +233,15 @@ def _leaves(content: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 def proofs(certificates: Mapping[str, Mapping[str, Any]], recomputed: Mapping[str, bool]) -> Section:
     """What each run's reward says of its expert, and what its learner proves."""
-    columns = [
-        {one.label: one.sentence for one in of_reward}
-        | {f"{one.label}, as its learner recorded": one.sentence for one in of_program}
-        for of_reward, of_program in map(facts_in, certificates.values())
-    ]
-    labels = dict.fromkeys(label for column in columns for label in column)
-    rows = [[label, *(column.get(label, NONE) for column in columns)] for label in labels]
+    rows = {}
+    for letter, certificate in certificates.items():
+        of_reward, of_program = facts_in(certificate)
+        rows[letter] = {one.label: one.sentence for one in of_reward}
+        rows[letter] |= {f"{one.label}, as its learner recorded": one.sentence for one in of_program}
     recorded = ", ".join(letter for letter, whether in recomputed.items() if not whether)
     lead = "What each run's reward says of its expert, and by the run's own record what its learner proves of its program."
     lead += f" Of {recorded} all of it is the record." if recorded else ""
-    return _table("certificate", "Certificates", lead, certificates, rows)
+    return _table("certificate", "Certificates", lead, rows)
 
 
 def doctors(

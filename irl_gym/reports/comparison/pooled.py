@@ -5,10 +5,8 @@ from collections.abc import Mapping, Sequence
 from irl_gym.intervals import Interval
 from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, others, score_of, several
 from irl_gym.judging.scores import called as called_policy
-from irl_gym.reports.comparison.shared_worlds import levels_of, levels_told
-from irl_gym.reports.page.panels import Panel
+from irl_gym.reports.comparison.runs_as_rows import runs_as_rows
 from irl_gym.reports.page.sections.section import Section
-from irl_gym.reports.page.sections.training import curves
 from irl_gym.runs.pooling import Pool, over_environments
 from irl_gym.written import number, percent, with_ends
 
@@ -16,13 +14,12 @@ TRIMMED = 4
 """Seeds from which on an interquartile mean leaves some out."""
 
 
-def over_seeds(pools: Sequence[Pool], places: Mapping[str, str], same_world: bool) -> Section | None:
+def over_seeds(pools: Sequence[Pool], places: Mapping[str, str]) -> Section | None:
     """The section; None where no two runs differ in their seed alone.
 
     Args:
         pools: runs that differ in their seed alone.
         places: what the environment of each run is called.
-        same_world: are all runs of one environment, so that their values can be drawn in one figure?
     """
     if not pools:
         return None
@@ -32,13 +29,9 @@ def over_seeds(pools: Sequence[Pool], places: Mapping[str, str], same_world: boo
     )
     if min(len(pool.runs) for pool in pools) < TRIMMED:
         lead += f" Of fewer than {TRIMMED} seeds nothing is left out, so it is the mean; an interval of so few is wide."
-    columns = [_column(pool, places) for pool in pools]
-    keys = dict.fromkeys(key for column in columns for key in column)
-    rows = [[key, *(column.get(key, "not there") for column in columns)] for key in keys]
-    shown = {"caption": "Over seeds", "headings": ["", *map(called, pools)], "rows": rows}
     lead += "".join(f" {_together(several, score)}" for several, score in over_environments(pools))
-    drawn = [pool for pool in pools if pool.curve is not None] if same_world else []
-    return Section("seeds", "Over seeds", lead, [_curves(drawn)] if drawn else [], "compare", shown)
+    shown = runs_as_rows("Over seeds", {called(pool): _row(pool, places) for pool in pools})
+    return Section("seeds", "Over seeds", lead, (), "compare", shown)
 
 
 def called(pool: Pool) -> str:
@@ -76,7 +69,7 @@ def spoken(score: Interval | None) -> str:
     return "none" if score is None else with_ends(score, score_of)
 
 
-def _column(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
+def _row(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
     """What the table says of a pool."""
     config, letter = pool.first.config, next(iter(pool.runs))
     lost = [run.metrics["reward"].get("worst_tie_regret_share") for run in pool.runs.values() if run.learned is not None]
@@ -109,13 +102,3 @@ def _of_policy(pool: Pool, name: str) -> dict[str, str]:
 def _together(several: Sequence[Pool], score: Interval) -> str:
     letters = "; ".join(map(called, several))
     return f"Over the {len(several)} environments of {letters} the score is {spoken(score)}, by what varies within each."
-
-
-def _curves(drawn: Sequence[Pool]) -> Panel:
-    """The learning curves of pools that have one."""
-    found = {called(pool): pool.curve for pool in drawn if pool.curve is not None}
-    series = {name: (steps, values[:, 0], (values[:, 1], values[:, 2])) for name, (steps, values) in found.items()}
-    levels = levels_of({called(pool): pool.policies_of_runs for pool in drawn})
-    ends = "; ".join(f"{name} end at {number(values[-1])}" for name, (_, values, _) in series.items())
-    caption = f"Interquartile means with their 95 % intervals (shaded): {ends}; {levels_told(levels)}."
-    return Panel("seed-curves", "Discounted value over seeds", caption, curves(series, levels, "discounted value"), height=400)

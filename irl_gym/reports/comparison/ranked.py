@@ -12,12 +12,13 @@ import numpy as np
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, agent_of, called, score_of, several
 from irl_gym.reports.comparison.pooled import averaged, returned, spoken
+from irl_gym.reports.comparison.pooled import called as called_pool
 from irl_gym.reports.comparison.shared_worlds import PolicyRows, agree, levels_of, levels_told, worth
 from irl_gym.reports.page.panels import Panel
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.reports.page.sections.training import curves as drawn
 from irl_gym.reports.page.sections.training import usual_levels
-from irl_gym.runs.pooling import Pool
+from irl_gym.runs.pooling import Pool, over_seeds
 from irl_gym.written import number, sentence_of
 
 TITLE = "Learning curves"
@@ -90,33 +91,64 @@ def _unlike(policies: Mapping[str, PolicyRows], same_world: bool) -> str:
     return f"In these runs {apart} not worth the same"
 
 
-def learning(curves: Mapping[str, Curve], policies: Mapping[str, PolicyRows], same_world: bool) -> Section:
-    """All learning curves in one figure."""
+def learning(
+    curves: Mapping[str, Curve], policies: Mapping[str, PolicyRows], same_world: bool, pools: Sequence[Pool]
+) -> Section:
+    """All learning curves in one figure; of runs that differ in their seed alone the mean with its interval, each run thin."""
     trained = {letter: one for letter, one in curves.items() if len(one.steps)}
     if not trained:
         return Section("learning", TITLE, "No agent was trained step by step.")
-    if same_world:
-        series = {f"run {letter}": (one.steps, one.value, None) for letter, one in trained.items()}
-        levels = levels_of({f"run {letter}": {letter: policies[letter]} for letter in trained})
-        what, told = "discounted value from the start", levels_told(levels)
-    else:
-        series = {
-            f"run {letter}": found for letter, one in trained.items() if (found := _scores(one, policies[letter])) is not None
-        }
-        levels, what, told = [*usual_levels(1.0, 0.0)], "score", "random actions are 0, the expert is 1"
-    if not series:
+    what, told = "discounted value from the start", ""
+    lines = {letter: (one.steps, one.value) for letter, one in trained.items()}
+    if not same_world:
+        what, told = "score", "random actions are 0, the expert is 1"
+        scored = {letter: _scores(one, policies[letter]) for letter, one in trained.items()}
+        lines = {letter: (trained[letter].steps, found) for letter, found in scored.items() if found is not None}
+    if not lines:
         return Section("learning", TITLE, "No run has a score to draw.")
-    ends = "; ".join(f"{name} ends at {number(values[-1])}" for name, (_, values, _) in series.items())
-    panel = Panel("curves", what.capitalize(), sentence_of(f"{ends}; {told}"), drawn(series, levels, what), height=400)
-    left = [letter for letter in curves if f"run {letter}" not in series]
+    groups = _groups(lines, pools)
+    series, thin = {}, {}
+    for name, letters in groups.items():
+        steps, values = lines[letters[0]][0], np.stack([lines[letter][1] for letter in letters])
+        band = np.array([over_seeds(column) for column in values.T]) if len(letters) > 1 else None
+        series[name] = (steps, values[0], None) if band is None else (steps, band[:, 0], (band[:, 1], band[:, 2]))
+        thin[name] = [] if band is None else [*values]
+    levels = [*usual_levels(1.0, 0.0)]
+    if same_world:
+        levels = levels_of({name: {letter: policies[letter] for letter in letters} for name, letters in groups.items()})
+        told = levels_told(levels)
+    ends = "; ".join(
+        f"{name} {'ends' if len(groups[name]) == 1 else 'end'} at {number(one[1][-1])}" for name, one in series.items()
+    )
+    seeds = (
+        "; of seeds together the interquartile mean (of fewer than 4 the mean) with its 95 % interval shaded, each run thin"
+        if any(thin.values())
+        else ""
+    )
+    panel = Panel(
+        "curves", what.capitalize(), sentence_of(f"{ends}{seeds}; {told}"), drawn(series, levels, what, thin), height=400
+    )
+    left = [letter for letter in curves if letter not in lines]
     lead = "What each agent earned under the true reward as it trained."
     lead += f" Without a curve, as nobody was trained step by step, or without a score: {', '.join(left)}." if left else ""
     return Section("learning", TITLE, lead, [panel])
 
 
-def _scores(curve: Curve, rows: PolicyRows) -> tuple[np.ndarray, np.ndarray, None] | None:
+def _groups(lines: Mapping[str, tuple[np.ndarray, np.ndarray]], pools: Sequence[Pool]) -> dict[str, list[str]]:
+    """The letters of the runs of each curve, by its name: of a pool that was measured at the same steps, or of one run."""
+    made: dict[str, list[str]] = {}
+    pooled: set[str] = set()
+    for pool in pools:
+        steps = [lines[letter][0] for letter in pool.runs if letter in lines]
+        if len(steps) == len(pool.runs) and all(np.array_equal(one, steps[0]) for one in steps):
+            made[called_pool(pool)] = [*pool.runs]
+            pooled |= {*pool.runs}
+    return made | {f"run {letter}": [letter] for letter in lines if letter not in pooled}
+
+
+def _scores(curve: Curve, rows: PolicyRows) -> np.ndarray | None:
     """A learning curve in scores; None where the expert is no better than random actions."""
     low, high = (rows[policy]["value"] for policy in (RANDOM, EXPERT))
     if low is None or high is None or not high > low:
         return None
-    return curve.steps, (curve.value - low) / (high - low), None
+    return (curve.value - low) / (high - low)

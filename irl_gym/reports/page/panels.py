@@ -65,7 +65,7 @@ def blank(**layout: Any) -> go.Figure:
 def axis(**more: Any) -> dict[str, Any]:
     """An axis in the page's colours."""
     plain = {"gridcolor": "var(--line)", "zerolinecolor": "var(--muted)", "linecolor": "var(--line)", "automargin": True}
-    return {**plain, "fixedrange": True, "tickfont": {"color": "var(--muted)"}, **more}
+    return {**plain, "tickfont": {"color": "var(--muted)"}, **more}
 
 
 def named(text: str) -> str:

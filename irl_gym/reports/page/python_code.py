@@ -1,4 +1,4 @@
-"""Python that makes the experiment of a configuration again, and what no configuration holds.
+"""Python that makes the experiment of a configuration again, or uses its reward; and what no configuration holds.
 
 A configuration names the class of each part, and lists small arrays. Of a large array it has a digest, of a function its name,
 of a class of the user's own nothing but that: in their places stands `...`.
@@ -8,18 +8,24 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from keyword import iskeyword
 from typing import Any
+
+from gymnasium import spaces
 
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, ValueIteration
+from irl_gym.environments.reveal import OBSERVATION
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.features.feature_maps import Functions, OneHot, Table, Unravel
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
 from irl_gym.mdp.rewards import plain_json
+from irl_gym.runs.choices import KNOWN
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.identity import NEW_FOLDER
+from irl_gym.spaces.states import StateIndex, States
 from irl_gym.tables.counted.counting import Counting, Interaction
 from irl_gym.tables.enumeration.table import Enumeration
 
@@ -85,6 +91,44 @@ def python_lines(config: Mapping[str, Any]) -> str:
         ["from irl_gym import Experiment, recover_and_retrain", *imports, "", "asked = Experiment(", *told, ")",
          f"report = recover_and_retrain(asked, {NEW_FOLDER!r})"]
     )  # fmt: skip
+
+
+def reward_lines(config: Mapping[str, Any], file: str, states: States | None) -> str | None:
+    """Python that pays a run's reward in its environment, in the folder of the run.
+
+    Args:
+        config: of the run.
+        file: that the reward is in.
+        states: the numbering of its table; None where the reward is of observations.
+
+    Returns:
+        The lines; None where the environment is a dataset's or made of cells, or a digest stands for what it was made with.
+    """
+    env_id, kwargs = config.get("env_id"), config.get("env_kwargs") or {}
+    if env_id is None or config.get("bins") is not None or missing({"env_kwargs": kwargs}):
+        return None
+    imports, made = ["from irl_gym import LearnedReward"], f"gym.make({repr(env_id) + _arguments(kwargs)})"
+    seeds, shown = config.get("start_seeds"), config.get("reveal", KNOWN)
+    space = getattr(states, "space", None)
+    added = isinstance(space, spaces.Dict) and OBSERVATION in space.spaces  # by Reveal
+    if seeds or added or shown not in (KNOWN, {}):
+        more = {"start_seeds": seeds or [], "reveal": shown}
+        imports.append("from irl_gym.runs.named_parts import environment_of")
+        made = f"environment_of({env_id!r}, {_python('', kwargs, set())}{_arguments(more)})"
+    else:
+        imports.insert(0, "import gymnasium as gym")
+    if states is None or (isinstance(states, StateIndex) and not states.terminal_copies):
+        return "\n".join([*imports, "", f"env = LearnedReward({made}, {file!r})"])
+    imports.append("from irl_gym.tables.table_files import TABLE, load_table")
+    numbered = "load_table(TABLE, env.observation_space).states"
+    return "\n".join([*imports, "", f"env = {made}", f"env = LearnedReward(env, {file!r}, {numbered})"])
+
+
+def _arguments(given: Mapping[str, Any]) -> str:
+    """Keyword arguments behind the first one."""
+    if not all(name.isidentifier() and not iskeyword(name) for name in given):
+        return f", **{_python('', given, set())}" if given else ""
+    return "".join(f", {name}={_python('', value, set())}" for name, value in given.items())
 
 
 def missing(config: Mapping[str, Any]) -> list[str]:

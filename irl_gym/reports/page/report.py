@@ -1,7 +1,8 @@
 """report.html: everything a run found, as one page that opens from disk.
 
-The order is a reader's: the verdict, the table of policies, rewards, values and policies side by side, the lambda slider, the
-feasible widths, the learning curve, episodes; then what proves it, what the doctor says, and how to run it again.
+The order is a reader's: three answers with what to do next, the table of policies, rewards, values and policies side by side,
+the learning curve, episodes; then how far the reward is from the true one, the lambda slider and the feasible widths; then what
+proves it, what the doctor says, and how to run it again.
 """
 
 import os
@@ -13,14 +14,16 @@ from irl_gym.reports.page.document import write_page
 from irl_gym.reports.page.sections import compared, episodes, slider, training
 from irl_gym.reports.page.sections.absent import absent
 from irl_gym.reports.page.sections.asked import asked, reproduce
+from irl_gym.reports.page.sections.judged import distances, policies_table
+from irl_gym.reports.page.sections.next_step import next_step
 from irl_gym.reports.page.sections.proof import doctor, proved, table_facts
 from irl_gym.reports.page.sections.section import Section, specs
-from irl_gym.reports.page.sections.verdict import policies_table, verdict
+from irl_gym.reports.page.sections.verdict import verdict
 from irl_gym.runs.run import Run
 from irl_gym.runs.supply import missing, supplied
 from irl_gym.written import seconds
 
-SCRIPTS = ("theme.js", "figures.js", "slider.js", "episodes.js")
+SCRIPTS = ("theme.js", "figures.js", "enlarge.js", "slider.js", "episodes.js")
 STAGES_LEAD = (
     "What was done once there was a table, and how long it took. The table is made first and this page is written last: "
     "neither is timed here."
@@ -34,11 +37,13 @@ def write_report(run: Run, path: str | os.PathLike) -> None:
         run: what a run left.
         path: of the file.
     """
-    sections = list(sections_of(RunContents(run), run))
+    contents = RunContents(run)
+    sections = list(sections_of(contents, run))
     context = {
         "title": page_title(run.env_id, run.config),
         "facts": supplied(facts, run),
-        "verdict": supplied(verdict, run),
+        "verdict": supplied(verdict, contents, run),
+        "next": supplied(next_step, contents, run),
         "sections": sections,
     }
     data: dict[str, Any] = {"figures": specs(sections), "slider": None, "episodes": {}}
@@ -76,7 +81,7 @@ def page_title(env_id: str | None, config: Mapping[str, Any]) -> str:
     return str(env_id or config.get("env_id") or config.get("dataset"))
 
 
-def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | None, whose: str) -> list[tuple[str, str]]:
+def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | None) -> list[tuple[str, str]]:
     """What stands below the title."""
     told = [
         ("learner", str((config.get("learner") or {}).get("type", "not known"))),
@@ -91,19 +96,19 @@ def facts(config: Mapping[str, Any], version: Mapping[str, Any], caution: str | 
         told.append(("irl_gym", str(version["irl_gym"])))
     if caution is not None:
         told.append(("files", caution))
-    told.append(("on this page", whose))
     return told
 
 
-SECTIONS: tuple[Callable[..., Section], ...] = (
+SECTIONS: tuple[Callable[..., Section | None], ...] = (
     policies_table,
     compared.rewards,
     compared.values,
     compared.policies,
-    slider.lambda_slider,
-    training.widths,
     training.learning,
     episodes.episodes,
+    distances,
+    slider.lambda_slider,
+    training.widths,
     proved,
     doctor,
     table_facts,

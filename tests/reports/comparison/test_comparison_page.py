@@ -43,9 +43,9 @@ def test_a_comparison_fits_a_phone_and_is_small(pages, look, which):
     assert pages[which].stat().st_size < 8_000_000
 
 
-def test_each_run_has_a_column_a_curve_and_a_reward(pages, look):
+def test_each_run_has_a_row_a_curve_and_a_reward(pages, look):
     page = look(pages["three"])
-    assert page.locator("#results thead th").all_inner_texts()[1:] == ["run A", "run B", "run C"]
+    assert page.locator("#results tbody th").all_inner_texts() == ["run A", "run B", "run C"]
     assert page.locator("#rewards .plot").count() == 3
     assert page.evaluate("document.getElementById('curves').data.map(one => one.name)")[:3] == ["run A", "run B", "run C"]
 
@@ -56,14 +56,15 @@ def test_curves_of_different_environments_are_scores(pages, look):
 
 
 def test_only_what_differs_of_the_configurations_is_listed(pages, look):
-    assert look(pages["two"]).locator("#differences tbody th").all_inner_texts() == ["learner.l1", "seed"]
+    assert look(pages["two"]).locator("#differences thead th").all_inner_texts()[1:] == ["learner.l1", "seed"]
 
 
-def test_arguments_of_one_run_alone_are_one_row(runs, tmp_path):
+def test_arguments_of_one_run_alone_are_one_column(runs, tmp_path):
     lake = runs["lake"]
     write_comparison([lake, replace(lake, config={**lake.config, "env_kwargs": {"desc": ["SG"]}})], tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text()
-    assert "Of the configuration 1 entry differs;" in text and '<th scope="row">env_kwargs.desc</th><td>not there</td>' in text
+    assert "Of the configuration 1 entry differs;" in text and '<th scope="col">env_kwargs.desc</th>' in text
+    assert '<th scope="row">run A</th><td>not there</td>' in text
 
 
 def test_the_name_of_a_folder_is_never_markup(pages, look):

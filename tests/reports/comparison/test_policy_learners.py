@@ -2,8 +2,7 @@
 
 import pytest
 
-from irl_gym.reports.comparison.compared_runs import lettered
-from irl_gym.reports.comparison.comparison_page import write_comparison
+from irl_gym.reports.comparison.comparison_page import lettered, write_comparison
 from irl_gym.reports.comparison.pooled import over_seeds, told
 from irl_gym.reports.comparison.ranked import sentence
 from irl_gym.runs.run import read_run
@@ -16,13 +15,14 @@ def seeds(policy_run):
 
 
 def test_seeds_of_a_policy_learner_are_one_pool_which_is_called_by_its_policies(seeds):
-    section = supplied(over_seeds, seeds)
-    rows = {name: cells for name, *cells in section.shown["rows"]}
+    found = seeds.pools
+    section = over_seeds(found, {"A": "a lake", "B": "a lake"})
+    rows = dict(zip(section.shown["headings"], map(list, zip(*section.shown["rows"], strict=True)), strict=True))
     low, high = sorted(run.metrics["policies"]["learned"]["score"] for run in seeds.runs.values())
     assert rows["score of the learner's policies, worst and best seed"] == [f"{low:.3f} and {high:.3f}"]
-    assert rows["learner"] == ["own_learners:Copycat"] and rows["seeds"] == ["0, 1"] and section.panels == []
+    assert rows["learner"] == ["own_learners:Copycat"] and rows["seeds"] == ["0, 1"] and not section.panels
     assert not any("worst tie" in name or "retrained" in name for name in rows)
-    assert told(seeds.pools[0]).startswith(f"runs A, B, mean over 2 seeds: score {(low + high) / 2:.3f}")
+    assert told(found[0]).startswith(f"runs A, B, mean over 2 seeds: score {(low + high) / 2:.3f}")
     assert supplied(sentence, seeds).startswith("Over 2 seeds the learner's policies have a score of ")
 
 
@@ -33,14 +33,11 @@ def test_a_policy_learner_is_compared_with_one_that_gives_both(policy_run, seeds
     assert page.wrong == [] and page.locator("#rewards .plot").count() == 1
     titles = page.locator("#policies h3").all_inner_texts()
     assert titles == ["Run A: learner's policy", "Run B: retrained agent", "Run B: learner's policy"]
-    rows = dict(
-        zip(
-            page.locator("#results tbody th").all_inner_texts(),
-            page.locator("#results tbody tr").all_inner_texts(),
-            strict=True,
-        )
-    )
+    heads = page.locator("#results thead th").all_inner_texts()
+    cells = [one.split("\t") for one in page.locator("#results tbody tr").all_inner_texts()]
+    rows = dict(zip(heads, zip(*cells, strict=True), strict=True))
     score = runs[0].metrics["policies"]["learned"]["score"]
-    assert rows["score, learner's policy"].split("\t")[1:] == [f"{score:.3f}"] * 2
-    assert rows["score, retrained agent"].split("\t")[1] == "not there"
-    assert rows["expert optimal under the reward"].split("\t")[1:] == ["not there", "no"]
+    same = dict(zip(*(page.locator(f"#results {part}").all_inner_texts() for part in ("dt", "dd")), strict=True))
+    assert same["score, learner's policy"] == f"{score:.3f}"
+    assert rows["score, retrained agent"][0] == "not there"
+    assert rows["expert optimal under the reward"] == ("not there", "no")

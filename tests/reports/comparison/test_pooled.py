@@ -3,14 +3,17 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from reports.page.made_runs import stepped_run, table_run
 
 from irl_gym.judging.curves import Curve
+from irl_gym.mdp.rewards import TabularReward
 from irl_gym.reports.comparison.compared_runs import lettered
-from irl_gym.reports.comparison.comparison_page import write_comparison
+from irl_gym.reports.comparison.comparison_page import rewards, write_comparison
 from irl_gym.reports.comparison.pooled import over_seeds, told
-from irl_gym.reports.comparison.ranked import sentence
+from irl_gym.reports.comparison.ranked import learning, sentence
+from irl_gym.runs.pooling import over_seeds as pooled
 from irl_gym.runs.supply import supplied
 
 
@@ -27,9 +30,9 @@ def page(seeds, tmp_path_factory):
     return path
 
 
-def section_of(runs, *, same=True):
+def section_of(runs):
     named = lettered(runs)
-    return over_seeds(named.pools, named.places, same)
+    return over_seeds(named.pools, named.places)
 
 
 def with_metrics(run, policy, **changes):
@@ -38,14 +41,15 @@ def with_metrics(run, policy, **changes):
 
 
 def cells(section):
-    return {row[0]: row[1:] for row in section.shown["rows"]}
+    heads = section.shown["headings"][1:]
+    return {head: [row[1 + i] for row in section.shown["rows"]] for i, head in enumerate(heads)}
 
 
-def test_seeds_are_a_section_with_a_table_and_a_curve_in_the_browser(page, look):
+def test_seeds_are_a_row_of_a_table_and_a_band_beside_thin_curves(page, look):
     found = look(page)
-    assert found.locator("#seeds thead th").all_inner_texts()[1:] == ["runs A, B, C, D"]
-    drawn = found.evaluate("document.getElementById('seed-curves').data.map(one => one.name)")
-    assert drawn[:2] == ["95 % interval", "runs A, B, C, D"] and [one.split()[0] for one in drawn[2:]] == ["expert", "random"]
+    assert found.locator("#seeds tbody th").all_inner_texts() == ["runs A, B, C, D"]
+    drawn = found.evaluate("document.getElementById('curves').data.map(one => [one.name.split(' ')[0], one.line.width])")
+    assert drawn == [["95", 0], *[["one", 1]] * 4, ["runs", 2], ["expert", 2], ["random", 2]]
 
 
 def test_the_verdict_over_seeds_is_a_mean_with_an_interval(page, look):
@@ -114,32 +118,42 @@ def test_a_pool_is_judged_by_the_worse_of_its_means(seeds):
     assert found["mean return of random actions and of the expert"] == ["23 and 501"]
 
 
-def test_seeds_whose_curves_have_other_steps_have_a_table_only(seeds):
-    short = Curve(*(getattr(seeds[1].curve, name)[:-1] for name in Curve.__dataclass_fields__))
-    found = section_of([seeds[0], replace(seeds[1], curve=short)])
-    assert found.panels == [] and cells(found)["seeds"] == ["0, 1"]
+def drawn(runs):
+    """The lines of the learning curves by name, without what stands behind it."""
+    (panel,) = supplied(learning, lettered(runs)).panels
+    return {one.name: one for one in panel.figure.data}, panel.caption
 
 
-def test_a_pool_without_a_curve_leaves_the_others_their_levels(seeds, tmp_path):
-    priced = [table_run(tmp_path / str(seed), seed=seed, l1=0.3, films=False) for seed in range(2)]
+def test_the_curve_of_seeds_is_their_mean_at_each_step_with_its_interval(seeds):
+    lines, _ = drawn(seeds)
+    values = np.stack([run.curve.value for run in seeds])
+    assert lines["runs A, B, C, D"].y == pytest.approx([over_steps.estimate for over_steps in map(pooled, values.T)], abs=1e-4)
+
+
+def test_seeds_whose_curves_have_other_steps_are_drawn_one_by_one(seeds):
     short = Curve(*(getattr(seeds[1].curve, name)[:-1] for name in Curve.__dataclass_fields__))
-    raised = [with_metrics(run, "expert", value=9.0) for run in priced]
-    (panel,) = section_of([seeds[0], replace(seeds[1], curve=short), *raised]).panels
-    assert [one.name for one in panel.figure.data if one.line.dash == "dash"] == ["expert 9"]
+    lines, caption = drawn([seeds[0], replace(seeds[1], curve=short)])
+    assert {"run A", "run B"} <= set(lines) and "95 % interval" not in lines and "shaded" not in caption
 
 
 def test_pools_whose_experts_differ_have_a_level_each(seeds, tmp_path):
     priced = [
         with_metrics(table_run(tmp_path / str(seed), seed=seed, l1=0.3, films=False), "expert", value=9.0) for seed in (0, 1)
     ]
-    (panel,) = section_of([*seeds[:2], *priced]).panels
-    levels = {one.name.rpartition(" ")[0]: one for one in panel.figure.data if one.line.dash in ("dash", "dot")}
-    assert list(levels) == ["expert of runs A, B", "expert of runs C, D", "random"]
-    assert "each run's in its own colour" in panel.caption
+    lines, caption = drawn([*seeds[:2], *priced])
+    levels = [name.rpartition(" ")[0] for name, one in lines.items() if one.line.dash in ("dash", "dot")]
+    assert levels == ["expert of runs A, B", "expert of runs C, D", "random"] and "each run's in its own colour" in caption
+
+
+def test_a_reward_that_several_seeds_learned_is_drawn_once(seeds, page, look):
+    titles = look(page).locator("#rewards h3").all_inner_texts()
+    assert titles == ["Runs A, B, C, D: FrozenLake-v1"]
+    other = replace(seeds[1], learned=TabularReward(2 * seeds[1].learned.values))
+    assert len(supplied(rewards, lettered([seeds[0], other])).panels) == 2
 
 
 def test_environments_are_taken_together_by_their_scores(seeds, tmp_path):
     carts = [stepped_run(tmp_path / "cart", seed=seed) for seed in range(2)]
     same = {name: seeds[0].config[name] for name in ("gamma", "learner")}
     alike = [replace(run, config={**run.config, **same}) for run in carts]
-    assert "Over the 2 environments of runs A, B; runs C, D the score is" in section_of([*seeds[:2], *alike], same=False).lead
+    assert "Over the 2 environments of runs A, B; runs C, D the score is" in section_of([*seeds[:2], *alike]).lead

@@ -146,7 +146,7 @@ def diagnosis_of(acting):
 
 def verdict_of(run):
     """What stands at the top of a run's page."""
-    return verdict(run.metrics, recomputed=run.recomputed)
+    return supplied(verdict, RunContents(run), run)
 
 
 def films_of(env, env_id, table, learned, policies, seed, frames):

@@ -9,6 +9,7 @@ from irl_gym.reports.comparison.compared_runs import lettered
 from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.comparison.ranked import sentence
 from irl_gym.reports.page.report import write_report
+from irl_gym.reports.page.sections.judged import policies_table
 from irl_gym.runs.supply import supplied
 
 TAXI = {"retrained": (0.82, -139.0, 16.0), "expert": (1.0, 7.8, 0.4), "random": (0.0, -770.0, 15.0)}
@@ -38,37 +39,37 @@ def earning(run, numbers, **metrics):
     ids=["taxi", "cart", "great", "open"],
 )
 def test_score_and_mean_return_have_the_colour_of_the_worse(lake, numbers, mood):
-    first, second = verdict_of(earning(lake, numbers))["figures"][:2]
-    assert (first["mood"], second["mood"]) == (mood, mood)
+    told = verdict_of(earning(lake, numbers))["questions"][0]
+    assert {told["mood"], *(one["mood"] for one in told["figures"])} == {mood}
 
 
 def test_the_mean_return_says_what_random_actions_and_the_expert_return(lake):
-    told = verdict_of(earning(lake, TAXI))
+    told = verdict_of(earning(lake, TAXI))["questions"][0]
     assert told["figures"][1]["value"] == "-139"
     assert told["figures"][1]["note"] == "95 %: -155 to -123; random actions have -770, the expert 7.8"
-    assert (
-        "a score of 0.820 and a mean return of -139: random actions have 0 and -770, the expert has 1 and 7.8"
-        in told["sentence"]
+    assert told["answer"] == "No" and told["sentences"][0].endswith(
+        "earns -139 an episode on average, the expert 7.8, random actions -770."
     )
-    assert told["judged"].startswith("How score and mean return are coloured: not good (0.820 of value, 0.811 of mean return).")
+    note = policies_table(earning(lake, TAXI).metrics).shown["note"]
+    assert "How score and mean return are coloured: not good (0.820 of value, 0.811 of mean return)." in note
 
 
 def test_a_mean_return_of_too_few_says_so(lake):
     equal = CART | {"retrained": (1.0, 500.0, None)}
-    assert verdict_of(earning(lake, equal))["figures"][1]["note"].startswith(
+    assert verdict_of(earning(lake, equal))["questions"][0]["figures"][1]["note"].startswith(
         "too few to say how surely; random actions have 22"
     )
 
 
 def test_a_mean_return_without_a_score_is_shown_without_a_judgement(lake):
-    told = verdict_of(earning(lake, CART | {"retrained": (None, 425.0, 17.0)}))
-    assert [one["mood"] for one in told["figures"][:2]] == ["plain", "plain"] and told["figures"][1]["value"] == "425"
-    assert "a mean return of 425: random actions have 22, the expert 500; there is no score" in told["sentence"]
+    told = verdict_of(earning(lake, CART | {"retrained": (None, 425.0, 17.0)}))["questions"][0]
+    assert [one["mood"] for one in told["figures"]] == ["plain", "plain"] and told["figures"][1]["value"] == "425"
+    assert told["answer"] == "Not judged" and told["sentences"][1].startswith("There is no score, as ")
 
 
 def test_a_run_whose_rows_have_no_returns_shows_without_them(lake):
     policies = {name: {"value": row["value"], "score": row["score"]} for name, row in lake.metrics["policies"].items()}
-    told = verdict_of(replace(lake, metrics={**lake.metrics, "policies": policies}))
+    told = verdict_of(replace(lake, metrics={**lake.metrics, "policies": policies}))["questions"][0]
     assert told["figures"][1]["value"] == "not known" and told["figures"][1]["note"] == "not recorded in this version"
 
 
@@ -81,7 +82,7 @@ def test_both_are_of_one_size_and_colour_on_the_page(lake, look, tmp_path_factor
         (size, colour), second, third, *_ = [one.evaluate(style) for one in page.locator(".verdict strong").all()]
         assert second == [size, colour] and third[0] == size and third[1] != colour
         assert page.evaluate("document.documentElement.scrollWidth") == width
-    assert "0.843 of mean return" in page.locator(".verdict .note").inner_text()
+    assert "0.843 of mean return" in page.locator("#summary .note").inner_text()
 
 
 def test_a_comparison_tells_mean_returns_beside_scores(lake, tmp_path):

@@ -196,8 +196,8 @@ def test_without_scripts_the_tables_are_there_and_a_sentence_says_so(pages, brow
 def test_sections_stand_in_a_reader_s_order(pages, look):
     shown = look(pages["grid"]).evaluate("[...document.querySelectorAll('main > section')].map(one => one.id)")
     assert shown[1:] == [
-        "summary", "rewards", "values", "policies", "lambda", "widths", "learning", "episodes", "certificate", "doctor",
-        "table", "stages", "asked", "reproduce",
+        "summary", "rewards", "values", "policies", "learning", "episodes", "distances", "lambda", "widths", "certificate",
+        "doctor", "table", "stages", "asked", "reproduce",
     ]  # fmt: skip
 
 
@@ -210,9 +210,10 @@ def test_a_run_without_a_table_leaves_out_what_needs_one_and_says_so(pages, look
 def test_the_command_is_shown_and_copied_or_marked(pages, look):
     page = look(pages["grid"])
     assert page.locator("#command").inner_text().startswith("irl-gym run")
-    page.get_by_role("button", name="Copy").click()
-    page.until("document.getElementById('copied').textContent")
-    assert re.match("Copied|Marked", page.locator("#copied").inner_text())
+    box = page.locator("#reproduce .command")
+    box.get_by_role("button", name="Copy").click()
+    page.until("document.querySelector('#reproduce .copied').textContent")
+    assert re.match("Copied|Marked", box.locator(".copied").inner_text())
 
 
 def test_a_run_from_python_has_lines_of_python(pages, look):

@@ -12,10 +12,10 @@ from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.page.sections.absent import absent
 from irl_gym.reports.page.sections.compared import policies, values
 from irl_gym.reports.page.sections.episodes import episodes
+from irl_gym.reports.page.sections.judged import distances, policies_table
 from irl_gym.reports.page.sections.proof import doctor, proved
 from irl_gym.reports.page.sections.slider import lambda_slider
 from irl_gym.reports.page.sections.training import widths
-from irl_gym.reports.page.sections.verdict import policies_table
 from irl_gym.runs.identity import into_folder
 from irl_gym.written import aligned, percent, state_called
 
@@ -84,13 +84,17 @@ def test_a_doctor_without_findings_says_what_was_examined(lake, answer, why, tol
 
 def test_the_worst_tie_says_of_what_it_loses(lake):
     told = {**lake.metrics, "reward": {**lake.metrics["reward"], "worst_tie_regret_share": 1.023}}
-    assert "lose 102.3\u00a0% of what the expert has over random" in verdict_of(replace(lake, metrics=told))["sentence"]
+    sentences = verdict_of(replace(lake, metrics=told))["questions"][1]["sentences"]
+    assert (
+        "The unluckiest policy that is best under it would lose 102.3\u00a0% of what the expert has over random actions."
+        in sentences
+    )
 
 
 def test_a_score_has_one_form(lake):
     score = score_of(lake.metrics["policies"]["retrained"]["score"])
-    told = verdict_of(lake)
-    assert told["figures"][0]["value"] == score and f"a score of {score} and a mean return of" in told["sentence"]
+    rows = {row[0].partition(",")[0]: row for row in policies_table(lake.metrics).shown["rows"]}
+    assert verdict_of(lake)["questions"][0]["figures"][0]["value"] == score and score in rows["retrained agent"]
 
 
 def test_the_certificate_tells_the_facts_of_the_reward_and_those_of_its_program(lake):
@@ -165,7 +169,7 @@ def test_no_agent_is_best_across_environments(lake, tmp_path):
 
 def test_the_distance_of_the_rewards_is_told_where_it_is_known(lake):
     told = replace(lake, metrics={**lake.metrics, "reward": {**lake.metrics["reward"], "starc": 0.684, "epic": None}})
-    found = policies_table(told.metrics).shown
+    found = distances(told.metrics).shown
     assert ("STARC distance", "0.68") in found["lines"] and "EPIC" not in str(found)
     assert "STARC distance: between the learned reward and the true one: 0 ranks all policies alike" in found["note"]
-    assert "distance" not in str(policies_table(lake.metrics).shown)
+    assert "distance" not in str(distances(lake.metrics).shown)

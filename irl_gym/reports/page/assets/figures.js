@@ -1,7 +1,9 @@
 "use strict";
 // Draws the figures of the page with Plotly. A colour "var(--name)" is the style sheet's, looked up at each change of colours.
 
-const CONFIG = { displayModeBar: false, displaylogo: false, responsive: false, scrollZoom: false, doubleClick: false };
+// A finger scrolls the page; a mouse zooms in by drawing a frame, and back by a double click. Enlarged, both have buttons.
+const FINE = window.matchMedia("(pointer: fine)");
+const CONFIG = { displayModeBar: false, displaylogo: false, responsive: false, scrollZoom: false, doubleClick: "reset" };
 const MOST_ROWS = 400;
 const NARROW = 480;
 const READABLE = 25; // pixels of a cell
@@ -110,8 +112,14 @@ function calledCells(spec, z) {
 }
 
 function drawFigure(name) {
-  const spec = DATA.figures[name];
   const box = document.getElementById(name);
+  const spec = DATA.figures[name];
+  const size = { width: box.clientWidth, height: heightOf(spec, box.clientWidth) };
+  return drawInto(box, spec, { ...size, dragmode: FINE.matches ? "zoom" : false }, CONFIG);
+}
+
+function drawInto(box, spec, layout, config) {
+  const { width, height } = layout;
   const figure = resolved({ data: spec.data, layout: spec.layout }, getComputedStyle(document.documentElement));
   if (spec.arrows) {
     const { plain, off } = outlines(spec.arrows);
@@ -121,14 +129,13 @@ function drawFigure(name) {
   const map = figure.data.find((one) => one.name === "values" && one.z);
   if (map) map.customdata = calledCells(spec, map.z);
   if (map && spec.short) map.text = map.z.map((row) => row.map(short));
-  const width = box.clientWidth;
   fitLetters(figure, width);
   if (width < NARROW) {
     figure.layout.font = { ...figure.layout.font, size: 11 };
   }
-  Object.assign(figure.layout, { width, height: heightOf(spec, width), autosize: false });
-  box.style.height = `${figure.layout.height}px`;
-  return Plotly.react(box, figure.data, figure.layout, CONFIG);
+  Object.assign(figure.layout, layout, { uirevision: "kept", autosize: false });
+  box.style.height = `${height}px`;
+  return Plotly.react(box, figure.data, figure.layout, config);
 }
 
 function drawAll() {

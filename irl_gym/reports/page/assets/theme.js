@@ -45,11 +45,10 @@ window.addEventListener("resize", stops);
 document.addEventListener("toggle", () => window.setTimeout(stops), true); // after what is opened was filled
 stops();
 
-const copy = document.getElementById("copy");
-if (copy) {
-  copy.addEventListener("click", async () => {
-    const told = document.getElementById("copied");
-    const command = document.getElementById("command");
+document.querySelectorAll(".command").forEach((box) => {
+  box.querySelector(".copy").addEventListener("click", async () => {
+    const told = box.querySelector(".copied");
+    const command = box.querySelector("pre");
     try {
       await navigator.clipboard.writeText(command.textContent);
       told.textContent = "Copied.";
@@ -62,7 +61,7 @@ if (copy) {
       told.textContent = "Marked: copy it with the keyboard.";
     }
   });
-}
+});
 
 function element(kind, text, attributes = {}) {
   const made = document.createElement(kind);

@@ -1,5 +1,8 @@
 """Rewards, values and policies side by side: what is true, and what was learned. Axes: S states, A actions."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from scipy.stats import spearmanr
 
@@ -12,6 +15,7 @@ from irl_gym.reports.page import maps, panels
 from irl_gym.reports.page.panels import Panel, bars, spread, telling
 from irl_gym.reports.page.scene import Scene, chosen
 from irl_gym.reports.page.sections.absent import REWARDS
+from irl_gym.reports.page.sections.goodness import not_goodness
 from irl_gym.reports.page.sections.section import Section
 from irl_gym.written import aligned, counted, number, percent
 
@@ -23,7 +27,9 @@ ANCHORS = {RETRAINED: "agent", LEARNED: "own"}
 """What figures of judged policies end in."""
 
 
-def rewards(learned: TabularReward | LinearReward, scene: Scene | None) -> Section:
+def rewards(
+    learned: TabularReward | LinearReward, scene: Scene | None, metrics: Mapping[str, Any], recomputed: bool
+) -> Section:
     """The environment's reward beside the learned one, each on its own scale; without a table, what that is made of."""
     if scene is None or scene.learned is None:
         return weights(learned)
@@ -35,6 +41,8 @@ def rewards(learned: TabularReward | LinearReward, scene: Scene | None) -> Secti
         "What the environment pays, which the learner never saw, beside what was recovered from the expert. Each has its own "
         "scale: many rewards make the same actions best, so the two need not look alike."
     )
+    if metrics["reward"].get("expert_optimal") and not metrics["reward"].get("degenerate"):
+        lead += not_goodness(scene, scene.learned, "" if recomputed else ", by the run's own record")
     return Section(*REWARDS, lead, made)
 
 

@@ -1,6 +1,7 @@
 """The learning curve, and how wide the feasible set leaves each state's reward."""
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,8 +106,9 @@ def curves(
     series: Mapping[str, tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray] | None]],
     levels: Sequence[Level],
     ylabel: str,
+    thin: Mapping[str, Sequence[np.ndarray]] = MappingProxyType({}),
 ) -> Any:
-    """Lines over environment steps, with bands where there are intervals, and levels."""
+    """Lines over environment steps, with bands where there are intervals, and levels; `thin` are beside one, at its steps."""
     figure = blank(
         xaxis=axis(title={"text": "environment steps"}, separatethousands=True, rangemode="tozero"),
         yaxis=axis(title={"text": ylabel}), showlegend=True, legend=below(), margin={"l": 8, "r": 12, "t": 44, "b": 8},
@@ -119,6 +121,11 @@ def curves(
             figure.add_scatter(
                 x=listed(x, 9), y=listed(y), mode="lines", fill="toself", fillcolor=f"var(--{colour})", opacity=0.22,
                 line={"width": 0}, hoverinfo="skip", name="95 % interval",
+            )  # fmt: skip
+        for one in thin.get(name, ()):
+            figure.add_scatter(
+                x=listed(steps, 9), y=listed(one), mode="lines", hoverinfo="skip", showlegend=False, opacity=0.6,
+                line={"color": f"var(--{colour})", "width": 1}, name=f"one of {plotted(name)}",
             )  # fmt: skip
         figure.add_scatter(
             x=listed(steps, 9), y=listed(values), mode="lines+markers", name=plotted(name),

@@ -40,13 +40,8 @@ def test_a_section_that_is_absent_says_why(run, tmp_path, need):
 
 def test_what_goes_with_a_reward_is_said_to_be_absent_once(run):
     without = replace(run, learned=None, curve=NO_CURVE, lambda_path=None, widths=None, films={})
-    assert [one.name for one in sections_of(RunContents(without), without)][:5] == [
-        "summary",
-        "rewards",
-        "values",
-        "policies",
-        "episodes",
-    ]
+    names = [one.name for one in sections_of(RunContents(without), without)]
+    assert names[:5] == ["summary", "rewards", "values", "policies", "episodes"]
 
 
 def test_a_run_without_a_table_has_no_sections_of_states(tmp_path):

@@ -40,8 +40,9 @@ def test_the_verdict_says_why_there_is_no_score(tmp_path):
     run = table_run(tmp_path, films=False)
     policies = {name: {**row, "score": None} for name, row in run.metrics["policies"].items()}
     told = verdict_of(replace(run, metrics={**run.metrics, "policies": policies, "score_reason": "two episodes are few"}))
-    assert "there is no score, as two episodes are few" in told["sentence"]
-    assert told["figures"][0]["note"] == "two episodes are few"
+    first = told["questions"][0]
+    assert "There is no score, as two episodes are few." in first["sentences"]
+    assert first["figures"][0]["note"] == "two episodes are few"
 
 
 def test_the_doctors_mends_name_their_flags(tmp_path):

@@ -82,8 +82,9 @@ class Margins:
         return self.values - self.rounding > self.none
 
     def hold(self, equal: np.ndarray) -> np.ndarray:
-        """(n,) rows that hold for certain."""
-        return np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+        """(n,) rows that hold for certain: by a margin, or as a tie over all steps."""
+        within = np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+        return within & (self.tied | (self.positive & ~equal))
 
 
 @dataclass(frozen=True, eq=False)

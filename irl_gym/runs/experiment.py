@@ -24,6 +24,7 @@ from irl_gym.mdp.rewards import plain_json
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.records import Record
 from irl_gym.runs.choices import KNOWN, Reveals
+from irl_gym.runs.needed import check_needs
 from irl_gym.tables.tabulate import By
 
 
@@ -35,6 +36,7 @@ class Experiment(Record):
         InvalidDiscount: gamma outside (0, 1).
         InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset, or an expert beside a dataset; two
             ways to make a table; noise outside 0 to 1.
+        MissingPart: the learner needs what this run cannot give it, such as the policy of an expert that is known by episodes.
     """
 
     env_id: str | None
@@ -120,6 +122,7 @@ class Experiment(Record):
         for name in ("episodes", "num_envs", "eval_episodes", "samples", "seed"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
+        check_needs(self.learner, self.env_id, self.dataset, self.epsilon, self.features)
 
     @property
     def from_episodes(self) -> bool:

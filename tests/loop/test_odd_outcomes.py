@@ -1,4 +1,4 @@
-"""What a learner of somebody's own gives is checked before anything is written of it: one sentence, and no traceback."""
+"""What a run gives a learner of somebody's own, and how what it gives is checked before anything is written of it."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -6,13 +6,15 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from own_learners import Told
+from own_learners import Needy, Told, parts_of
 
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.facts import Fact
+from irl_gym.features.feature_maps import OneHot
 from irl_gym.learners.base import Outcome
-from irl_gym.learners.needs import Needs
+from irl_gym.learners.needs import PARTS, Needs
+from irl_gym.loop.loop import MAKERS
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.programs.status import Status
@@ -72,12 +74,28 @@ class Giving:
         return CASES[self.which][0]()
 
 
+def learning(path, learner, **asked):
+    tiny = {"env_kwargs": {"desc": ["SF", "FG"], "is_slippery": False}, "episodes": 2, "retrain": ValueIteration()}
+    return recover_and_retrain(Experiment("FrozenLake-v1", 0.9, learner=learner, **tiny, **asked), path)
+
+
+@pytest.mark.parametrize("part", [one for one in PARTS if one not in ("also", "horizon")])
+def test_a_run_gives_a_learner_no_part_that_it_does_not_declare(tmp_path, monkeypatch, part):
+    monkeypatch.setitem(MAKERS, "agent", (stop,))
+    with pytest.raises(InvalidParameter, match="far enough"):
+        learning(tmp_path / "run", Needy(part), features=OneHot(4))
+    assert parts_of(Needy.given.pop()) == [part]
+
+
+def stop():
+    raise InvalidParameter("far enough")
+
+
 @pytest.mark.parametrize("which", CASES)
 def test_an_outcome_that_is_none_is_refused_in_a_sentence_and_nothing_is_kept_of_it(tmp_path, which):
-    tiny = {"env_kwargs": {"desc": ["SF", "FG"], "is_slippery": False}, "episodes": 2, "retrain": ValueIteration()}
     _, error, told = CASES[which]
     with pytest.raises(error, match=told):
-        recover_and_retrain(Experiment("FrozenLake-v1", 0.9, learner=Giving(which), **tiny), tmp_path / "run")
+        learning(tmp_path / "run", Giving(which))
     assert not (tmp_path / "run" / "certificate.json").exists()
 
 

@@ -73,8 +73,10 @@ def at_odds(
         if "table.npz" in there:
             yield f"metrics.json tells of no table, and table.npz is there; {mend}"
         if certificate["optimality"] is not None:
-            told = "certificate.json says whether the expert is optimal under a reward, which only a table tells"
-            yield f"{told}, and metrics.json tells of none; delete both, and they are made again"
+            what = (
+                "certificate.json says whether the expert is optimal, which only a table tells, and metrics.json tells of none"
+            )
+            yield f"{what}; delete certificate.json and metrics.json, and they are made again"
     if not rewarded and (certificate["optimality"] is not None or "reward.npz" in there):
         what = "no agent was retrained, but certificate.json or reward.npz is of a reward"
         yield f"{what}; delete certificate.json and metrics.json, and they are made again"

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo paper test lint types unit wheel bars clean
+.PHONY: demo paper test lint types unit wheel bars lowest versions clean
 
 demo: $(READY)  ## recover a reward on FrozenLake 8x8, retrain PPO on it, print the report
 	$(BIN)/irl-gym run --env-id FrozenLake-v1 --env-kwargs map_name=8x8 --out runs/demo
@@ -46,6 +46,23 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python scripts/measure_demonstrations.py
 	$(BIN)/irl-gym reproduce ng-russell-2000
 
+# Torch is not among the lowest: each of its versions is gigabytes. Tools that only test are the newest.
+LOWEST := .lowest
+lowest:  ## the tests with the lowest versions that pyproject.toml allows
+	test -x $(LOWEST)/bin/python || $(PYTHON) -m venv $(LOWEST)
+	grep '^torch==' constraints.txt > $(LOWEST)/torch.txt
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check uv --requirement $(LOWEST)/torch.txt
+	VIRTUAL_ENV=$(LOWEST) $(LOWEST)/bin/uv pip install --quiet --resolution lowest-direct --override $(LOWEST)/torch.txt --editable '.[data,minigrid]'
+	VIRTUAL_ENV=$(LOWEST) $(LOWEST)/bin/uv pip install --quiet --override $(LOWEST)/torch.txt $(TESTING)
+	$(LOWEST)/bin/python -m pytest -n auto --dist loadfile
+
+TESTING := beartype gym-classics hypothesis playwright pytest pytest-xdist
+PYTHONS := 3.11 3.12 3.13 3.14
+versions:  ## are there wheels of all dependencies for each Python?
+	test -x $(LOWEST)/bin/uv || { $(PYTHON) -m venv $(LOWEST) && $(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check uv; }
+	for one in $(PYTHONS); do $(LOWEST)/bin/uv pip compile --quiet --python-version $$one --only-binary :all: --all-extras pyproject.toml \
+		> /dev/null || exit 1; echo "Python $$one: wheels of every dependency"; done
+
 # torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -54,4 +71,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) dist runs .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(LOWEST) dist runs .pytest_cache .ruff_cache .hypothesis

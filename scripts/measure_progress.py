@@ -12,7 +12,6 @@ import ctypes
 import json
 import multiprocessing
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -90,6 +90,7 @@ def until_first_words(folder):
     start = time.perf_counter()
     command = [sys.executable, str(SCRIPT), "--out", str(Path(folder) / "run")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        assert process.stderr is not None
         process.stderr.read(1)
         taken = time.perf_counter() - start
         process.kill()
@@ -103,7 +104,7 @@ def weights(agent):
 
 def killed(world, paid, total, path, until):
     """Go on with a training in a process that is killed at a step; the step at which it was, and the one that is kept."""
-    at = multiprocessing.Value(ctypes.c_int64, 0, lock=False)
+    at: Any = multiprocessing.Value(ctypes.c_int64, 0, lock=False)
 
     def see(steps, policy):
         at.value = steps
@@ -116,7 +117,7 @@ def killed(world, paid, total, path, until):
     process.start()
     while process.is_alive() and at.value < until:
         time.sleep(0.001)
-    os.kill(process.pid, signal.SIGKILL)
+    process.kill()
     process.join()
     kept = json_in(read_arrays(path), "told")["counters"]["num_timesteps"] if path.exists() else 0
     return at.value, kept

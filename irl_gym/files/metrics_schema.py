@@ -197,7 +197,7 @@ class Demonstrated(Lost):
     vecnormalize: NotRequired[bool]
 
 
-TrainingEntry = TypedDict("Training", {
+TrainingEntry = TypedDict("TrainingEntry", {
     "environment_steps": Count, "resumed_at": NotRequired[list[Count]],
     "steps_to_0.9": Count | None, "steps_to_0.99": Count | None,
 })  # fmt: skip

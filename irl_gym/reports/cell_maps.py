@@ -47,7 +47,7 @@ def plane(axis: Axes, cells: Cells, table: TransitionTable, values: np.ndarray, 
 
 def draw_actions(cells: Cells, table: TransitionTable, panels: Mapping[str, np.ndarray], n_actions: int) -> Figure:
     """Policies side by side; panels are (S,) actions by title."""
-    figure = drawing.blank(5.2 * len(panels), 4.8)
+    figure, handles = drawing.blank(5.2 * len(panels), 4.8), []
     for axis, (title, actions) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items(), strict=True):
         handles = plane_of_actions(axis, cells, table, actions, tuple(f"action {a}" for a in range(n_actions)))
         axis.set_title(title)

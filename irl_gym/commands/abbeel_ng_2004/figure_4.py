@@ -19,7 +19,7 @@ import numpy as np
 from irl_gym.commands.abbeel_ng_2004.gridworld import Gridworld
 from irl_gym.commands.ng_russell_2000.records import Check, Progress, near, reported
 from irl_gym.learners.cloning.clone import Clone
-from irl_gym.mdp.planning.dynamic_programming import evaluate_policy, value_iteration
+from irl_gym.mdp.planning.dynamic_programming import policy_evaluation, value_iteration
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
@@ -66,12 +66,12 @@ class Figure4:
             rng = np.random.default_rng([self.seed, number])
             R = np.repeat(self.world.weights(rng)[self.world.cells][:, None], mdp.n_actions, axis=1)
             expert = value_iteration(mdp, R, sweeps=30).policy
-            best = mdp.d0 @ evaluate_policy(mdp, R, expert)
+            best = mdp.d0 @ policy_evaluation(mdp, R, expert)
             drawn, shares = np.eye(mdp.n_actions)[rng.integers(mdp.n_actions, size=self.world.n_cells)[self.world.cells]], []
             for counts in self._shown(mdp, expert, rng):
                 seen = (counts, counts, counts + FAINT * drawn)
                 clones = [one.fit(steps).policy for one, steps in zip(learners, seen, strict=True)]
-                shares.append([mdp.d0 @ evaluate_policy(mdp, R, clone) / best for clone in clones])
+                shares.append([mdp.d0 @ policy_evaluation(mdp, R, clone) / best for clone in clones])
                 report((number + len(shares) / len(self.sizes)) / self.instances)
             found.append(np.transpose(shares))
         return Outcome4(self, np.array(found))

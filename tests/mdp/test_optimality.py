@@ -275,6 +275,26 @@ def test_margins_that_drown_in_rounding_are_undecided_and_no_ties(gamma):
     assert "no action is certainly better than the expert's, and one may be" in told(found)["undecided"]
 
 
+@pytest.mark.parametrize("gamma", [0.999, 1 - 1e-4, 1 - 1e-6, 1 - 1e-9, 1 - 1e-12])
+def test_a_constant_reward_where_no_episode_ends_is_never_called_not_optimal(gamma):
+    """Each policy earns the same; that rows of float64 sum to 1 but for rounding must not say otherwise, over many steps."""
+    for seed in range(3):
+        model = models.random_model(seed)
+        found = certify(TabularMDP(model.mdp.P, gamma, model.mdp.d0), model.expert, np.ones(7))
+        assert found.expert_optimal is not False and not found.violated.size
+
+
+@pytest.mark.parametrize("gamma", [0.9, 0.99, 0.999, 1 - 1e-4, 1 - 1e-6])
+@pytest.mark.parametrize("action", [0, 1])
+def test_rows_that_sum_to_1_but_for_rounding_violate_nothing(gamma, action):
+    """One action leads to where 0.1 + 0.2 + 0.7 is a little less than 1, the other to where 1/4 + 1/4 + 1/2 is 1."""
+    P = np.zeros((7, 2, 7))
+    P[0, 0, 1] = P[0, 1, 4] = 1
+    P[1:4, :, 1:4], P[4:, :, 4:] = [0.1, 0.2, 0.7], [0.25, 0.25, 0.5]
+    found = certify(TabularMDP.from_dense(P, gamma, np.eye(7)[0]), np.full(7, action), np.ones(7))
+    assert found.expert_optimal is not False and not found.violated.size
+
+
 @pytest.mark.parametrize("gamma", GAMMAS)
 def test_a_tie_of_whole_numbers_is_one_at_any_gamma(gamma):
     """Both actions lead to states of equal reward, with no rounding in it."""

@@ -63,7 +63,7 @@ def test_the_command_prints_writes_and_draws(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(Figure4, "quick", lambda: replace(SMALL, within=1.0))
     assert command(["--quick", "--figure", "4", "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr()
-    assert "Every verdict is yes." in said.out and "mimic the expert, 10 shown" in said.out and said.err == ""
+    assert "Every verdict is yes." in said.out and "mimic the expert, 10 shown" in said.out and "figure 4: done" in said.err
     assert {one.name for one in (tmp_path / "out").iterdir()} == {"figure_4.png", "abbeel_ng_2004.json", "timings.json"}
     found = read_json(tmp_path / "out" / "abbeel_ng_2004.json")
     assert found["figure_4"]["curves"].keys() == {*CURVES} and "seconds" not in json.dumps(found)

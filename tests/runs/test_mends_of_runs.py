@@ -174,7 +174,7 @@ def test_a_mend_that_the_folder_of_a_run_names_serves(finished, unvouched, says,
     assert says in told(reads, unvouched) and mended(unvouched)
 
 
-FILES = [f"{one}.py" for one in ("experiment", "needed", "world_choice", "worlds", "run_reader", "runs/run", "identity",
+FILES = [f"{one}.py" for one in ("experiment", "world_choice", "worlds", "run_reader", "runs/run", "identity",
                                  "checks", "terminal", "verified", "pipeline", "closing")]  # fmt: skip
 ELSEWHERE = [
     "Wrap a function of observations in `irl_gym.agents.experts.Acting`.",  # test_mends_of_experts

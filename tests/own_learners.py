@@ -9,7 +9,7 @@ from irl_gym.agents.experts import Acting
 from irl_gym.demonstrations.demonstrated import smoothed
 from irl_gym.facts import Fact
 from irl_gym.learners.base import Outcome
-from irl_gym.learners.needs import Needs
+from irl_gym.learners.needs import PARTS, Needs
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.programs.status import Status
 
@@ -67,6 +67,28 @@ class Both(Copycat):
         for episode in problem.demonstrations:
             np.add.at(visits, episode.rows(seen)[1:], 1.0)
         return Outcome(TabularReward(visits / visits.max()), Status.LEARNED, Told(0), policy=policy)
+
+
+def parts_of(problem):
+    """The names of what is there of a problem."""
+    return [one for one in PARTS if (found := getattr(problem, one)) is not None and not (one == "also" and not found)]
+
+
+@dataclass(frozen=True)
+class Needy:
+    """Needs one part of a problem, and keeps what it is given, as it is."""
+
+    part: str
+    given: ClassVar[list] = []
+
+    @property
+    def needs(self):
+        return Needs((self.part,))
+
+    def learn(self, problem, rng):
+        self.given.append(problem)
+        self.needs.of(problem, self)
+        return Outcome(TabularReward(np.zeros(problem.spaces.observations.n)), Status.LEARNED, Told(0))
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,16 @@ class Checkpoint:
             self.went_on = model.num_timesteps
             self.resumed = [*told["resumed"], *([] if exact else [model.num_timesteps])]
             return int(told["report_at"])
-        except (OSError, DamagedFile, KeyError, ValueError, TypeError, AttributeError, RuntimeError, IndexError) as error:
+        except (
+            OSError,
+            DamagedFile,
+            LookupError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            RuntimeError,
+            ArithmeticError,
+        ) as error:
             why = " ".join(str(error).split())[:200]
             raise RunConflict(
                 f"{self.path} cannot be read ({type(error).__name__}: {why}): expected the training that was under way. "
@@ -204,8 +213,10 @@ def _restore(model: Any, found: Mapping[str, np.ndarray], told: Mapping[str, Any
         kept = _below(f"model/weights/{name}", found)
         weights[name] = {**one, "state": _of_optimizer(kept)} if "optimizer" in name else _tensors(kept)
     model.set_parameters(weights)
-    for name, one in told["counters"].items():
-        setattr(model, name, one)
+    for name in filter(lambda one: hasattr(model, one), COUNTERS):  # nothing else that a file names
+        if not isinstance(told["counters"][name], int | float):
+            raise TypeError(f"{name} is no number")
+        setattr(model, name, told["counters"][name])
     episodes = [{"r": r, "l": int(n), "t": t} for r, n, t in found["model/episodes"].tolist()]
     model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)

@@ -29,7 +29,7 @@ from irl_gym.agents.checkpoints import Checkpoint, Watching
 from irl_gym.agents.shown_observations import Normaliser, read_shown, write_shown
 from irl_gym.checks import checked_number
 from irl_gym.environments.tabular_vec_env import TabularVecEnv
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, InvalidPolicy
 from irl_gym.files.own_files import write_bytes
 from irl_gym.mdp.planning.dynamic_programming import value_iteration
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution
@@ -289,5 +289,12 @@ def torch_threads(threads: int) -> Iterator[None]:
 
 
 def tabular_actions(policy: Policy, states: States) -> Actions:
-    """(S,) the action that a policy takes, deterministically, in each state."""
-    return np.asarray(policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)[0]).astype(np.int64)
+    """(S,) the action that a policy takes, deterministically, in each state.
+
+    Raises:
+        InvalidPolicy: what it predicts are no whole numbers.
+    """
+    found = np.asarray(policy.predict(states.decode_batch(np.arange(states.n_states)), deterministic=True)[0])
+    if found.dtype.kind not in "iu":
+        raise InvalidPolicy(f"{type(policy).__name__} predicts {found.dtype}: expected whole numbers, an action a state.")
+    return found.astype(np.int64)

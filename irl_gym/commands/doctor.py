@@ -103,8 +103,8 @@ def main(arguments: Arguments) -> int:
     if diagnosis is None:
         return 2
     show(diagnosis, console, run)
-    if diagnosis.examined and (run is None or run.table is not None):
-        console.print(Text(f"\n{WHOSE}"))
+    if diagnosis.examined:
+        console.print(Text(f"\n{WHOSE if run is None or run.table is not None else harmless(run.whose)}"))
     if run is not None and run.caution is not None:
         console.print(Text(f"\n{run.caution}"))
     complete = unfinished is None and not without_page(run, console)

@@ -44,7 +44,7 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
     """What was learned, a reward or a policy or both, and what the learner proves of it.
 
     Raises:
-        InvalidParameter: neither a reward nor a policy; or a status or a proof that is none.
+        InvalidParameter: neither a reward nor a policy; or a status, a proof, notes or a policy that is none.
         InvalidReward: a reward that is none.
     """
 
@@ -68,20 +68,31 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
             raise InvalidParameter(f"status is {self.status!r:.80}: expected a Status, such as Status.LEARNED.")
         if not isinstance(self.proof, Proof):
             raise InvalidParameter(f"proof is a {type(self.proof).__name__}: expected `facts()` and `to_json()`.")
+        if not isinstance(self.stats, Mapping):
+            raise InvalidParameter(f"stats is {self.stats!r:.80}: expected notes by name.")
+        if isinstance(self.policy, type):
+            raise InvalidParameter(f"policy is the class {self.policy.__name__}: expected a policy that was made of it.")
         if self.reward is None and self.policy is None:
             raise InvalidParameter("reward and policy are None: expected what was learned, at least one of the two.")
 
     def facts(self) -> tuple[Fact, ...]:
-        """What became of the program, and what the proof says."""
+        """What became of the program, and what the proof says.
+
+        Raises:
+            InvalidParameter: the proof says something else than facts.
+        """
         moods: dict[Status, Mood] = {Status.OPTIMAL: "plain", Status.LEARNED: "plain", Status.INACCURATE: "open"}
         label = "status" if self.status is Status.LEARNED else "status of the program"
         told = Fact(label, self.status.sentence.removesuffix("."), moods.get(self.status, "bad"))
-        return (told, *self.proof.facts())
+        proved = self.proof.facts()
+        if not (isinstance(proved, tuple | list) and all(isinstance(one, Fact) for one in proved)):
+            raise InvalidParameter(f"{type(self.proof).__name__}.facts() gave {proved!r:.80}: expected a tuple of `Fact`.")
+        return (told, *proved)
 
     def proved(self) -> dict[str, Any]:
         """What a certificate keeps of the proof: its facts, the terms that are read by name, and entries of another's own."""
         told, known = self.proof.to_json(), getattr(self.proof, "known", False)
-        facts = [one.to_json() for one in self.facts()]
+        facts = [one.to_json() for one in Outcome.facts(self)]  # whatever a class of somebody's own makes of them
         return {"facts": facts, "terms": told if known else {}, "own": {} if known else told}
 
     def record(self) -> dict[str, Any]:

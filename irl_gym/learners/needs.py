@@ -9,7 +9,7 @@ Who needs an oracle is interactive, who needs an environment or its dynamics act
 required moves nobody: Table 1 has no column for who reads it and needs no environment.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -77,6 +77,10 @@ class Needs(Record):
         asked = [{*part.split(OR)} for part in self.required]
         return "active" if any(part <= {"environment", "dynamics"} for part in asked) else "passive"
 
+    def lacking(self, given: Collection[str]) -> str | None:
+        """The first part that is required and not given, as it was declared; None where all are."""
+        return next((part for part in self.required if not {*given} & {*part.split(OR)}), None)
+
     def worked_out(self, parts: Mapping[str, Callable[[], Any]]) -> dict[str, Any]:
         """What a learner reads, by name, where parts cost something: of two of which one is enough no more than one.
 
@@ -87,7 +91,7 @@ class Needs(Record):
         for part in (*self.required, *self.optional):
             for one in part.split(OR):
                 found[one] = parts[one]()
-                if found[one] is not None:
+                if not _absent(found[one]):
                     break
         return found
 
@@ -102,14 +106,10 @@ class Needs(Record):
             MissingPart: it lacks a part that is required.
         """
         given = {one for one in PARTS if not _absent(getattr(problem, one))} | ({"gamma"} if problem.discount else set())
-        later: set[str] = set()
-        for part in self.required:
-            later |= {*[one for one in part.split(OR) if one in given][1:]}
-            if given.isdisjoint(part.split(OR)):
-                how = "; or ".join(TO_GET[one] for one in part.split(OR))
-                raise MissingPart(
-                    f"{type(learner).__name__} needs {part}, and the problem has {_listed(given)}: expected {how}."
-                )
+        if (lacks := self.lacking(given)) is not None:
+            how = "; or ".join(TO_GET[one] for one in lacks.split(OR))
+            raise MissingPart(f"{type(learner).__name__} needs {lacks}, and the problem has {_listed(given)}: expected {how}.")
+        later = {one for part in self.required for one in [one for one in part.split(OR) if one in given][1:]}
         kept = {} if "gamma" in self.unused else {"gamma": problem.discount}
         return replace(problem, **{one: () if one == "also" else None for one in (*self.unused, *later)}, **kept)
 

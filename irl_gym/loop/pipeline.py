@@ -1,9 +1,8 @@
 """The closed loop in one call: environment -> expert -> Minari -> LP-IRL -> reward -> SB3 -> how good it is."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from irl_gym.environments.reveal import shown_by
 from irl_gym.files.own_files import held
@@ -13,7 +12,6 @@ from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.identity import STAGES
 from irl_gym.runs.run import read_run
 from irl_gym.runs.summary import Report
-from irl_gym.tables.tabulation import Tabulation
 
 
 def recover_and_retrain(
@@ -61,12 +59,8 @@ def recover_and_retrain(
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}
-        found = loop.judged, loop.certificate
-        metrics, certificate = _read_again(loop.path, loop.world.table) if stages["report"].get("kept") else found
-    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), shown_by(loop.env))
-
-
-def _read_again(path: Path, table: Tabulation | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """The metrics and the certificate of a run that was finished before, which may have been changed since."""
-    run = read_run(path, table)
-    return run.metrics, run.certificate
+        metrics, certificate, whose = loop.judged, loop.certificate, None
+        if stages["report"].get("kept"):  # it may have been changed since
+            run = read_run(loop.path, loop.world.table)
+            metrics, certificate, whose = run.metrics, run.certificate, run.whose
+    return Report(loop.path, metrics, certificate, stages, experiment.to_json(), shown_by(loop.env), whose)

@@ -24,7 +24,7 @@ from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
 from irl_gym.files.run_folder import LOGS, write_json
-from irl_gym.files.run_schema import checked
+from irl_gym.files.run_schema import Stats, checked
 from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
 from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
@@ -145,9 +145,11 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
         InvalidParameter: it is no json, or has an entry that is read and is of another kind.
     """
     try:
-        told = json.loads(json.dumps({"certificate": certificate, "record": record}, allow_nan=False))
-        facts_in(checked(told["certificate"], Certificate))
-    except (DamagedFile, TypeError, ValueError) as error:
+        told = json.dumps({"certificate": certificate, "record": record}, allow_nan=False, sort_keys=True, ensure_ascii=False)
+        found = json.loads(told.encode())
+        checked(found["record"]["stats"], Stats)
+        facts_in(checked(found["certificate"], Certificate))
+    except (DamagedFile, TypeError, ValueError, RecursionError) as error:
         raise InvalidParameter(
             f"what {class_name(learner)} proves or notes cannot be kept: {error}. Expected json, whose known entries are of "
             "their kind."

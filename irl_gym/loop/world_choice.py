@@ -17,6 +17,7 @@ from irl_gym.errors import (
     NotDiscrete,
     NotTabular,
 )
+from irl_gym.learners.needs import PARTS
 from irl_gym.loop.table_world import TableWorld, step_limit
 from irl_gym.loop.worlds import RunWorld, SteppedWorld
 from irl_gym.runs.experiment import Experiment
@@ -65,7 +66,8 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float |
     except (NotTabular, NotDiscrete) as error:
         if not isinstance(env.action_space, spaces.Discrete):
             raise
-        if "dynamics" in asked.learner.needs.required or getattr(asked.learner, "on_rows", False):
+        of_table = asked.learner.needs.lacking({*PARTS} - {"dynamics", "reward"})
+        if of_table is not None or getattr(asked.learner, "on_rows", False):
             raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):

@@ -37,7 +37,7 @@ class Loss:
     """What the best policy earns more than an expert, from d0 and discounted: bounds that hold with all rounding."""
 
     low: float
-    """At least this."""
+    """At least this; where that would settle it, less what the rounding of the table's own numbers may make of it."""
     high: float
     """At most this."""
     scale_low: float
@@ -95,6 +95,8 @@ def loss_of(found: Optimum, expert: Matrix, unknown: StateMask | None = None) ->
     gain = max(_sum(mdp.d0, random[0] - e, -1), 0.0), _sum(mdp.d0, random[1] + found.above, 1)
     span = _span(found, expert)
     scale = min(gain[0], max(span[0], 0.0)), min(gain[1], span[1])
+    if low > OPTIMAL_SHARE * scale[1]:  # a "no", unless the rounding of the table's own numbers makes it
+        low -= float(mdp.d0 @ (found.drift(found.best) + found.drift(expert)))
     tied = bool(found.tied()[~mdp.terminal].all()) and not low > OPTIMAL_SHARE * scale[1]
     return Loss(max(low, 0.0), max(high, 0.0), *scale, tied)
 

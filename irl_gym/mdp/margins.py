@@ -82,8 +82,9 @@ class Margins:
         return self.values - self.rounding > self.none
 
     def hold(self, equal: np.ndarray) -> np.ndarray:
-        """(n,) rows that hold for certain."""
-        return np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+        """(n,) rows that hold for certain: by a margin, or as a tie over all steps."""
+        within = np.where(equal, np.abs(self.values), -self.values) + self.unsure <= self.none
+        return within & (self.tied | (self.positive & ~equal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +145,9 @@ def margins_of(found: Optimum, comparisons: Comparisons, tolerance: float | None
 
     `tolerance` is what the solver of R left open; None for the reward's own.
     """
-    behind, unsure = found.behind(comparisons.distribution)
-    return _margins(found, comparisons, *found.less_than(behind, unsure), found.V - behind, tolerance)
+    mine = comparisons.distribution
+    behind, unsure = found.behind(mine)
+    return _margins(found, comparisons, *found.less_than(behind, unsure), found.V - behind, mine, tolerance)
 
 
 def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
@@ -153,18 +155,25 @@ def best_margins(found: Optimum, comparisons: Comparisons) -> Margins:
     (gap, wide), mine = found.gaps, comparisons.distribution
     gap = gap - (mine * gap).sum(axis=1, keepdims=True)
     own = np.multiply(mine, wide, out=np.zeros_like(wide), where=mine > 0)  # a bound may be infinite
-    return _margins(found, comparisons, gap, wide + own.sum(axis=1, keepdims=True), found.V, None)
+    return _margins(found, comparisons, gap, wide + own.sum(axis=1, keepdims=True), found.V, found.best, None)
 
 
 def _margins(
-    found: Optimum, comparisons: Comparisons, values: Matrix, unsure: Matrix, V: Vector, tolerance: float | None
+    found: Optimum,
+    comparisons: Comparisons,
+    values: Matrix,
+    unsure: Matrix,
+    V: Vector,
+    onwards: Matrix,
+    tolerance: float | None,
 ) -> Margins:
     at, reward = (comparisons.states, comparisons.actions), found.table.reward
     left = reward.tolerance if tolerance is None else tolerance
     worth = found.table.mdp.gamma * V + (reward.values if reward.on_states else 0.0)
     moved = ~(comparisons.trivial & reward.on_states)  # the others are 0 whatever the reward
     noise = 0.0 if comparisons.sampling is None else comparisons.sampling.of_margins(worth)
-    margins, rounding, level = values[at] * moved, np.where(moved, unsure[at], 0.0), found.level[at]
+    margins, rounding = values[at] * moved, np.where(moved, unsure[at], 0.0)
+    level = found.level_against(comparisons.distribution, onwards)[at]
     nothing = TIE * (1 - found.table.mdp.gamma) * found.advantages.size[at]
     same, tied = ((np.abs(margins) <= np.minimum(level, nothing) + more) & (rounding <= nothing) for more in (0.0, left))
     return Margins(margins, rounding + noise, level + left, rounding, same, tied, worth)

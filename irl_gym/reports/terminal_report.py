@@ -51,6 +51,8 @@ def render(report: Report) -> Iterator[RenderableType]:
     )
     own = "" if report.config.get("dataset") is not None else "dataset, "
     yield f"Kept in {out}: {own}{made} and films."
+    if report.whose is not None:
+        yield Text(harmless(report.whose))
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
         yield Text(harmless(lost))

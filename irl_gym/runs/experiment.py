@@ -16,10 +16,11 @@ from irl_gym.agents.planners import Planner
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.endings import checked_after_end
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, MissingPart
 from irl_gym.features.feature_maps import FeatureMap
 from irl_gym.learners.base import Learner, checked_learner
 from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.learners.needs import OR, PARTS
 from irl_gym.mdp.rewards import plain_json
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.records import Record
@@ -35,6 +36,7 @@ class Experiment(Record):
         InvalidDiscount: gamma outside (0, 1).
         InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset, or an expert beside a dataset; two
             ways to make a table; noise outside 0 to 1.
+        MissingPart: the learner needs what this run cannot give it, such as the policy of an expert that is known by episodes.
     """
 
     env_id: str | None
@@ -120,6 +122,7 @@ class Experiment(Record):
         for name in ("episodes", "num_envs", "eval_episodes", "samples", "seed"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, int(getattr(self, name)))  # NumPy's integers seed neither Gymnasium nor SB3
+        _check_needs(self.learner, self.env_id, self.dataset, self.epsilon, self.features)
 
     @property
     def from_episodes(self) -> bool:
@@ -138,6 +141,31 @@ class Experiment(Record):
         """
         told = {name: as_config(getattr(self, name)) for name in self.__dataclass_fields__}
         return {name: value for name, value in told.items() if name not in LATER or value != LATER[name]}
+
+
+def _check_needs(learner: Any, env_id: str | None, dataset: str | None, epsilon: float, features: Any) -> None:
+    """Check, before anything is worked out, that a run can give a learner what it needs of all but the world.
+
+    Raises:
+        MissingPart: it cannot.
+    """
+    own = "Call its `learn` with a Problem of your own."
+    lacks = {"also": ("a run is of one world", own)}
+    if dataset is None:
+        lacks["horizon"] = "a run knows one only of a dataset's episodes", own
+    if features is None:
+        told = "Give features, such as OneHot(16). (On the command line every run gives them to a learner that needs them.)"
+        lacks["features"] = "no features are given", told
+    if dataset is not None or epsilon:
+        env = "the environment's id" if env_id is None else env_id
+        told = f"Leave dataset out, and give env_id. (On the command line: --env-id {env} without --dataset or --csv.)"
+        if dataset is None:
+            told = "Leave epsilon out. (On the command line: the same without --epsilon.)"
+        lacks |= dict.fromkeys(("expert", "oracle"), ("the expert is known by its episodes only", told))
+    part = learner.needs.lacking({*PARTS} - {*lacks})
+    if part is not None:
+        why, mend = lacks[part.split(OR)[0]]
+        raise MissingPart(f"{type(learner).__name__} needs {part}, and {why}: expected a run that has it. {mend}")
 
 
 LATER = {"after_end": "refuse", "trust_dataset": False, "features": None}

@@ -25,6 +25,8 @@ class Report(Record):
     """The content of config.json: the experiment."""
     shown: Mapping[str, int]
     """Hidden integers that the observation was made to show, with their numbers of values."""
+    whose: str | None = None
+    """Of a run that was finished before, what was computed again of it, and that all else is its record (`Run.whose`)."""
 
     @property
     def page(self) -> Path:

@@ -1,5 +1,7 @@
 """Training that is broken off goes on from its checkpoint: in the same bits on a table, and elsewhere says that it is not."""
 
+import json
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -123,6 +125,35 @@ def test_a_checkpoint_holds_numbers_and_text_alone(tmp_path, lake_table):
     broken_off(lambda: lake(lake_table), "DQN", tmp_path / "kept.npz", 900)
     with np.load(tmp_path / "kept.npz", allow_pickle=False) as found:
         assert {found[name].dtype.kind for name in found} <= set("biufU")
+
+
+def edited(path, change):
+    """Change what a checkpoint tells beside its arrays."""
+    with np.load(path) as found:
+        arrays = dict(found)
+    told = json.loads(str(arrays["told"]))
+    change(told)
+    np.savez(path, **arrays | {"told": np.array(json.dumps(told))})
+
+
+def test_a_checkpoint_sets_its_counters_and_nothing_else_that_it_names(tmp_path, lake_table):
+    path = tmp_path / "kept.npz"
+    broken_off(lambda: lake(lake_table), "PPO", path, 900)
+    edited(path, lambda told: told["counters"].update(gamma=0.1, policy="mine"))
+    gone_on, _ = trained(lake(lake_table), "PPO", Checkpoint(path, "it"))
+    assert same(gone_on, trained(lake(lake_table), "PPO", None)[0]) and gone_on.model.gamma != 0.1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda told: told["counters"].update(num_timesteps="many"), lambda told: told["numpy"].__setitem__(1, [-1] * 624),
+     lambda told: told["torch"].__setitem__(0, 10**400)],
+)  # fmt: skip
+def test_a_checkpoint_with_other_numbers_than_a_training_leaves_is_named(tmp_path, lake_table, change):
+    broken_off(lambda: lake(lake_table), "PPO", tmp_path / "kept.npz", 900)
+    edited(tmp_path / "kept.npz", change)
+    with pytest.raises(RunConflict, match=r"kept.npz cannot be read .* Delete it, and its stage is run again"):
+        trained(lake(lake_table), "PPO", Checkpoint(tmp_path / "kept.npz", "it"))
 
 
 @pytest.mark.parametrize("damage", ["cut", "weights"])

@@ -18,8 +18,10 @@ class Pond(FrozenLakeEnv):
 gym.register("Pond-v0", entry_point="own_env_here:Pond", max_episode_steps=50)
 """,
     "own_learner_here": """
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
+
+import numpy as np
 
 from irl_gym.learners.linear_programs.finite import FiniteLP
 
@@ -28,6 +30,12 @@ class Twin:
     needs: ClassVar = FiniteLP.needs
     def learn(self, problem, rng):
         return FiniteLP().learn(problem, rng)
+
+class Asker(Twin):
+    needs: ClassVar = replace(FiniteLP.needs, required=("dynamics", "oracle"))
+    def learn(self, problem, rng):
+        actions = [problem.oracle.ask(state) for state in range(problem.dynamics.n_states)]
+        return FiniteLP().fit(problem.dynamics, np.array(actions))
 """,
 }
 

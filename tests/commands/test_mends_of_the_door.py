@@ -5,6 +5,7 @@ import pytest
 LOG = "episode,step,cell,action\na,0,0,1\na,1,2,2\n"
 POND = ("--env-id", "FrozenLake-v1", "--env-kwargs", 'desc=["SF","FG"]', "is_slippery=false")
 CSV = ("--csv", "log.csv", "--observation-columns", "cell", "--retrain", "value-iteration")
+ASKER = ("--learner", "own_learner_here:Asker", "--retrain", "value-iteration", "--episodes", "5")
 CASES = [
     ("expected a subcommand, as in `irl-gym run --env-id FrozenLake-v1`.", ("--env-id", "FrozenLake-v1"),
      ("learners", "--markdown")),
@@ -17,6 +18,10 @@ CASES = [
     ("Run irl-gym in the folder that has it, or install it.", ("learners", "nowhere_to_be_found:Twin"),
      ("learners", "own_learner_here:Twin")),
     ("Did you mean 'doctor'?", ("doktor",), ("doctor", "--help")),
+    ("Leave epsilon out. (On the command line: the same without --epsilon.)",
+     ("run", *POND, *ASKER, "--epsilon", "0.1"), ("run", *POND, *ASKER)),
+    ("Leave dataset out, and give env_id. (On the command line: --env-id FrozenLake-v1 without --dataset or --csv.)",
+     ("run", *POND, *CSV, *ASKER[:2]), ("run", *POND, *ASKER)),
     ("Choose another --out.", ("run", *POND, *CSV, "--out", "taken"), ("run", *POND, *CSV, "--out", "other")),
 ]  # fmt: skip
 

@@ -17,7 +17,7 @@ from irl_gym.environments.tabular_env import TabularEnv
 from irl_gym.errors import InvalidParameter, MissingPart, UnknownLearner
 from irl_gym.features.feature_maps import OneHot
 from irl_gym.learners.base import Outcome
-from irl_gym.learners.needs import PARTS
+from irl_gym.learners.needs import PARTS, Needs
 from irl_gym.learners.problem import Oracle, Problem
 from irl_gym.learners.registry import BUILT_IN, learner_class, learner_of
 from irl_gym.mdp.episodes import collect_from_table
@@ -51,7 +51,8 @@ def whole():
     policy = TabularPolicy(np.eye(grid.mdp.n_actions)[grid.expert], states)
     return Problem.of(
         grid.mdp, demonstrations=episodes, expert=grid.expert, oracle=Oracle(policy), reward=TabularReward(grid.R),
-        environment=Simulator(env, ValueIteration(), grid.mdp.gamma, table), features=OneHot(grid.mdp.n_states),
+        environment=Simulator(env, ValueIteration(), grid.mdp.gamma, table), features=OneHot(grid.mdp.n_states), horizon=7,
+        gamma=grid.mdp.gamma, also=(Problem.of(grid.mdp),),
     )  # fmt: skip
 
 
@@ -96,6 +97,12 @@ def test_an_outcome_is_told_in_facts_and_json(name, whole):
 def test_a_learner_reads_no_more_than_it_declares(name, whole):
     unused = {part: () if part == "also" else None for part in learner_class(name).needs.unused}
     same(learned(name, whole), learned(name, replace(whole, **unused)))
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_of_all_that_is_known_a_learner_sees_only_what_it_declares(whole, part):
+    seen = Needs((part,)).of(whole, None)
+    assert own_learners.parts_of(seen) == [part]
 
 
 @every

@@ -223,67 +223,6 @@ def test_facts_say_how_many_rows_are_left_out_on_the_word_of_who_gave_them():
     assert told(part)["margins"].endswith("; 1 row of (4) given as unbreakable left out")
 
 
-# --- any gamma, any size of the reward ---
-
-GAMMAS = (1e-12, 0.5, 0.9, 0.99, 1 - 1e-6, 1 - 1e-9, 1 - 1e-12)
-SCALES = (1e-300, 1.0, 1e300, 1e308)
-
-
-def rewards(model, scale):
-    """The one the expert maximises, its opposite, one that prefers nothing, and one on steps that is about nothing."""
-    steps = np.random.default_rng(0).normal(size=(7, 3))
-    return [scale * (one / np.abs(one).max()) for one in (model.R, -model.R, np.ones(7), steps)]
-
-
-@pytest.mark.parametrize("errs", [False, True])
-@pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("gamma", GAMMAS)
-def test_certify_never_contradicts_itself_at_any_gamma_and_size(gamma, scale, errs):
-    """Warnings are errors here; what is refused is no number, by the largest that a value, or a difference of two, can be."""
-    for seed, kind in ((0, "dense"), (1, "sparse"), (3, "walls")):
-        model = models.random_model(seed, kind=kind)
-        mdp = TabularMDP(model.mdp.P, gamma, model.mdp.d0)
-        for R in rewards(model, scale):
-            try:
-                found = certify(mdp, model.expert, R, errs=errs)
-            except InvalidReward:
-                assert scale * 4 / (1 - gamma) > 1e308
-                continue
-            tied, violated, undecided = (set(one.tolist()) for one in (found.tied, found.violated, found.undecided))
-            assert not (tied & violated or tied & undecided or violated & undecided)
-            assert found.expert_optimal is not False or ((violated or undecided) and not found.degenerate)
-            assert not found.degenerate or not (violated or undecided)
-            assert not (found.expert_optimal and np.isnan(found.loss_share)) or found.degenerate
-            numbers = found.loss_low, found.at_stake, found.worst_violation, *found.violations
-            assert np.isfinite(numbers).all() and not np.isinf(found.margin).any()
-
-
-@pytest.mark.parametrize("exponent", [-1000, -300, 300, 1000])
-def test_certify_says_the_same_of_a_reward_in_other_units(exponent):
-    model = models.random_model(0)
-    plain, scaled = (certify(model.mdp, model.expert, -one) for one in (model.R, np.ldexp(model.R, exponent)))
-    for name in ("loss_low", "loss_bound", "at_stake", "worst_violation", "margin", "violations"):
-        np.testing.assert_array_equal(np.ldexp(getattr(plain, name), exponent), getattr(scaled, name))
-    assert (plain.expert_optimal, plain.loss_share) == (scaled.expert_optimal, scaled.loss_share)
-
-
-@pytest.mark.parametrize("gamma", [1 - 1e-9, 1 - 1e-12])
-def test_margins_that_drown_in_rounding_are_undecided_and_no_ties(gamma):
-    model = models.random_model(0)
-    found = certify(TabularMDP(model.mdp.P, gamma, model.mdp.d0), model.expert, -model.R)
-    assert found.expert_optimal is False and found.undecided.size and not found.tied.size
-    assert "no action is certainly better than the expert's, and one may be" in told(found)["undecided"]
-
-
-@pytest.mark.parametrize("gamma", GAMMAS)
-def test_a_tie_of_whole_numbers_is_one_at_any_gamma(gamma):
-    """Both actions lead to states of equal reward, with no rounding in it."""
-    P = np.zeros((4, 2, 4))
-    P[0, [0, 1], [1, 2]] = P[1, :, 3] = P[2, :, 3] = P[3, :, 0] = 1
-    found = certify(TabularMDP.from_dense(P, gamma, np.eye(4)[0]), np.zeros(4, dtype=int), np.array([0.0, 1, 1, 0]))
-    assert found.tied.tolist() == [0] and found.expert_optimal and found.degenerate and not found.undecided.size
-
-
 @pytest.mark.parametrize("errs", ["no", 0, None, np.array([True])])
 def test_errs_is_true_or_false(errs):
     with pytest.raises(InvalidParameter, match=r"errs is .*: expected True or False"):

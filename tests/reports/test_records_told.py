@@ -2,17 +2,20 @@
 
 import csv
 import io
+import shutil
 
 import pytest
 from forgetting import with_digests_anew
-from lake_run import asked
+from lake_run import asked, of_policies
 from rich.console import Console
 
+from irl_gym.agents.planners import ValueIteration
 from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.reports.comparison.comparison_page import write_comparison
 from irl_gym.reports.page.report import write_report
 from irl_gym.reports.terminal_report import print_report
+from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.metrics_csv import write_metrics_csv
 from irl_gym.runs.run import read_run
 from irl_gym.runs.scorecard import read_metrics
@@ -30,9 +33,9 @@ def strange(copied):
     return with_digests_anew(copied)
 
 
-def in_terminal(path, to):
+def in_terminal(path, to, experiment=None):
     console = Console(width=400, record=True, file=io.StringIO())
-    print_report(recover_and_retrain(asked(), path), console)
+    print_report(recover_and_retrain(experiment or asked(), path), console)
     return console.export_text()
 
 
@@ -57,6 +60,23 @@ def test_names_of_a_stranger_s_policies_are_spelled_out(strange, tmp_path, shown
     said = shown(strange, tmp_path)
     assert SPELLED[0] in said and (SPELLED[1] in said or shown is in_csv)
     assert not any(one in said for one in ("\x1b", "\u202e", "\r"))
+
+
+@pytest.mark.parametrize("shown", [in_terminal, on_page, in_comparison])
+def test_what_a_stranger_says_of_policies_is_told_as_a_record(strange, tmp_path, shown):
+    said = shown(strange, tmp_path)
+    assert "All else is the run's own record, and among it" in said.replace("&#39;", "'") and "what is said of theirs" in said
+
+
+def test_of_a_run_without_a_table_that_is_shown_again_all_is_told_as_a_record(policy_run, tmp_path):
+    path = shutil.copytree(policy_run("stepped"), tmp_path / "stepped")
+    assert "Everything is the run's own record." in in_terminal(path, tmp_path, of_policies("stepped"))
+
+
+def test_a_run_that_was_just_made_is_not_told_as_a_record(tmp_path):
+    made = {"episodes": 2, "retrain": ValueIteration(), "env_kwargs": {"desc": ["SF", "FG"], "is_slippery": False}}
+    first, again = (in_terminal(tmp_path / "run", tmp_path, Experiment("FrozenLake-v1", 0.9, **made)) for _ in range(2))
+    assert "own record" not in first and "Computed again from its files" in again
 
 
 def test_a_policy_s_name_is_short(copied, strange):

@@ -9,6 +9,8 @@ import pytest
 import tyro
 from lake_run import COMMAND, asked
 from mended import mends, told, unsaid
+from models import random_model
+from own_learners import Needy
 from stable_baselines3 import PPO
 
 from irl_gym.agents.planners import SB3, Agent, ValueIteration
@@ -19,6 +21,7 @@ from irl_gym.features.feature_maps import OneHot
 from irl_gym.files.own_files import held
 from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
+from irl_gym.learners.problem import Problem
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.world_choice import place_of
@@ -76,6 +79,16 @@ CASES = [
     ("Leave expert and epsilon out.", lambda _: asking(dataset="me/a-v0", epsilon=0.1), lambda _: asking(dataset="me/a-v0")),
     ("Leave one out.", lambda _: asking(table=Interaction(9), bins=3), lambda _: asking(bins=3)),
     ("Leave one out.", lambda _: parse_keywords(["a=1", "a=2"]), lambda _: parse_keywords(["a=2"])),
+    ("Leave epsilon out.", lambda _: asking(epsilon=0.1, learner=Needy("expert")), lambda _: asking(learner=Needy("expert"))),
+    ("Leave dataset out, and give env_id.", lambda _: asking(dataset="me/a-v0", learner=Needy("oracle")),
+     lambda _: asking(learner=Needy("oracle"))),
+    ("--env-id the environment's id without --dataset or --csv.)",
+     lambda _: asking(env_id=None, dataset="me/a-v0", learner=Needy("expert")), lambda _: asking(learner=Needy("expert"))),
+    ("Give features, such as OneHot(16).", lambda _: asking(learner=Needy("features")),
+     lambda _: asking(learner=Needy("features"), features=OneHot(16))),
+    *(("Call its `learn` with a Problem of your own.", lambda _, part=part: asking(learner=Needy(part)),
+       lambda _, one={part: value}, part=part: Needy(part).learn(Problem.of(random_model(0).mdp, **one), None))
+      for part, value in (("also", (Problem.of(random_model(0).mdp),)), ("horizon", 9))),
     # places
     ("Leave bins out.", lambda path: place(path, bins=3), lambda path: isinstance(place(path), TableWorld)),
     ("Register it.", lambda _: stepped(Car()), lambda _: registered()),

@@ -2,10 +2,12 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from forgetting import without_digests
+from reports.page.made_runs import stepped_run
 
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.commands import doctor as doctor_command
@@ -113,6 +115,13 @@ def test_a_folder_that_may_not_be_read_gets_one_clear_line(monkeypatch, tmp_path
     monkeypatch.setattr("irl_gym.runs.run.read_run", refused)
     assert doctor_command.main(doctor_command.Arguments(tmp_path)) == 2
     assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path}'\n"
+
+
+def test_what_a_run_without_a_table_says_is_told_as_its_record(monkeypatch, tmp_path, capsys):
+    run = replace(stepped_run(tmp_path), stages={"reward": {"status": "optimal", "stats": {}}})
+    monkeypatch.setattr("irl_gym.runs.run.read_run", lambda path: run)
+    doctor_command.main(doctor_command.Arguments(tmp_path))
+    assert "Everything is the run's own record." in capsys.readouterr().out
 
 
 def test_one_episode_is_judged_and_told_to_tell_no_noise(doctor, tmp_path):

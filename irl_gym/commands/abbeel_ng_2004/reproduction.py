@@ -18,8 +18,8 @@ from rich.console import Console
 
 from irl_gym.commands.abbeel_ng_2004 import figures
 from irl_gym.commands.abbeel_ng_2004.figure_4 import Figure4
-from irl_gym.commands.ng_russell_2000.records import Check
-from irl_gym.commands.terminal import exit_code, print_error, print_table, read_arguments, stage_bars
+from irl_gym.commands.ng_russell_2000.reproduction import table_of, told_verdicts
+from irl_gym.commands.terminal import exit_code, print_error, read_arguments, stage_bars
 from irl_gym.errors import InvalidParameter, IrlGymError
 from irl_gym.files.run_folder import write_json
 
@@ -64,16 +64,6 @@ def main(arguments: Arguments) -> int:
     except (IrlGymError, OSError) as error:
         print_error(error)
         return 2
-    columns = ("what", "paper", "ours", "deviation", "bar", "verdict")
-    print_table("Figure 4: value of clones over the expert's", columns, map(_row, outcome.checks), console.width)
+    console.print(table_of(outcome.checks, "Figure 4: value of clones over the expert's"))
     console.print(f"Figure and numbers are in {arguments.out}; {time.perf_counter() - start:.0f} s.", markup=False)
-    missed = [one.what for one in outcome.checks if one.verdict is False]
-    console.print(f"{len(missed)} verdicts are no." if missed else "Every verdict is yes.")
-    return 1 if missed else 0
-
-
-def _row(check: Check) -> tuple[str, ...]:
-    paper = check.paper if isinstance(check.paper, str) else f"{check.paper:.3f}"
-    deviation = "" if check.deviation is None else f"{check.deviation:+.3f}"
-    verdict = "-" if check.verdict is None else "yes" if check.verdict else "no"
-    return check.what, paper, f"{check.ours:.3f}", deviation, check.bar, verdict
+    return told_verdicts(outcome.checks, console)

@@ -74,9 +74,7 @@ def main(arguments: Arguments) -> int:
         print_error(error)
         return 2
     console.print(f"Figures and numbers are in {arguments.out}.", markup=False, soft_wrap=True)
-    missed = [one.what for outcome, _ in done.values() for one in outcome.checks if one.verdict is False]
-    console.print(f"{len(missed)} verdicts are no." if missed else "Every verdict is yes.")
-    return 1 if missed else 0
+    return told_verdicts([one for outcome, _ in done.values() for one in outcome.checks], console)
 
 
 def run(number: int, arguments: Arguments, console: Console) -> tuple[Any, float]:
@@ -102,7 +100,14 @@ def run(number: int, arguments: Arguments, console: Console) -> tuple[Any, float
     return outcome, spent
 
 
-def table_of(checks: "tuple[Check, ...]", title: str) -> Table:
+def told_verdicts(checks: "Sequence[Check]", console: Console) -> int:
+    """Print how many verdicts are no; what the process exits with."""
+    missed = sum(one.verdict is False for one in checks)
+    console.print(f"{missed} verdicts are no." if missed else "Every verdict is yes.")
+    return int(missed > 0)
+
+
+def table_of(checks: "Sequence[Check]", title: str) -> Table:
     """Paper, ours, deviation, verdict."""
     table = Table(title=title, title_justify="left", title_style="bold")
     for name in ("what", "paper", "ours", "deviation", "bar", "verdict"):

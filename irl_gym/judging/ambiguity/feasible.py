@@ -84,7 +84,7 @@ class Membership:
     counted: bool
     """Is the table an estimate from counts, whose noise may hide it?"""
     ties: int
-    """States without a margin, of those that R could give one."""
+    """States in which another action, that R could tell from the expert's, is as good to rounding and `tolerance`."""
     margin: Vector
     """(S,) smallest margin of the expert over another action; NaN where (4) has no row that R can move."""
     violated_rows: np.ndarray
@@ -180,7 +180,7 @@ def membership(
         tolerance=tolerance,
         undecided=undecided,
         counted=part.visits is not None,
-        ties=np.unique(c.states[usable & (margins.values <= margins.none)]).size,
+        ties=np.unique(c.states[usable & margins.tied]).size,
         violated_rows=np.stack([posed.rows[c.states[violated]], c.actions[violated]], axis=1).astype(np.int64),
         violations=violations[violated],
         **{name: over_all_states(posed, mdp, array) for name, array in spread.items()},

@@ -204,12 +204,11 @@ class Case:
 
     @cached_property
     def beyond(self) -> StateMask:
-        """(S,) states in which every row that R can move has a margin."""
-        if self.rows is None or self.mdp is None or self.reward is None:
-            return np.zeros_like(self.acting)
-        usable = self._kept
-        left = least_per_state((self.rows.margins - self.rows.none)[usable], self.rows.states[usable], self.mdp.n_states)
-        return left > 0
+        """(S,) states in which every row that R can move has a margin, beyond its own rounding as `certify` counts it."""
+        found = np.isfinite(self.least)
+        if self.rows is not None:
+            found[self.rows.states[self._kept & ~self.rows.found.positive]] = False
+        return found
 
     @property
     def margins(self) -> Numbers:

@@ -133,6 +133,10 @@ def constant_reward(case: Case) -> Finding | None:
     same = float(np.ptp(paid)) <= 1e-9 * case.scale
     if case.margins.size or (not same and case.prefers):
         return None
+    if not same and not case.optimum.tied()[case.acting].all():
+        more = "rounding, the solver or the counts leave more open than actions differ by"
+        told = f"No action is certainly better than another under the reward: over all later steps {more}."
+        return Finding("flat-reward", told, "A smaller gamma, or larger margins.", flags=("--gamma",))
     what = f"is {paid.flat[0]:.4g} in every reachable state" if same else "pays every action alike in every reachable state"
     ends = case.states[case.mdp.terminal[case.states]]
     where = f"episodes end only where every action leads ({WHERE})" if ends.size else "no state ends an episode"

@@ -108,7 +108,7 @@ class Optimum:
     @cached_property
     def error(self) -> Vector:
         """(S,) |W - V*| is at most this."""
-        behind, unsure = self.behind(np.eye(self.blocked.shape[1])[self.policy])
+        behind, unsure = self.behind(self.best)
         return np.maximum(self.above, np.maximum(behind + unsure, 0.0))
 
     @cached_property
@@ -130,11 +130,27 @@ class Optimum:
 
         Of the terms of the step itself, and of those of all later ones.
         """
-        mdp, states = self.table.mdp, np.arange(self.policy.size)
-        own = TIED * self.advantages.size
-        discounted = Discounted(mdp.P[states * mdp.n_actions + self.policy], mdp.gamma)
-        later = np.maximum(discounted.solve(own[states, self.policy]), 0.0)
-        return own + later[:, None] + mdp.gamma * (mdp.P @ later).reshape(own.shape)
+        return self.level_against(self.best, self.best)
+
+    def level_against(self, distribution: Matrix, onwards: Matrix) -> Matrix:
+        """(S, A) the same of what a policy (S, A) does first, less an action, where another (S, A) goes on after either."""
+        each = self._own + self.table.mdp.gamma * (self.table.mdp.P @ self.drift(onwards)).reshape(self.blocked.shape)
+        return each + (distribution * each).sum(axis=1, keepdims=True)
+
+    def drift(self, distribution: Matrix) -> Vector:
+        """(S,) what that rounding can make of the value of a policy (S, A), to first order."""
+        discounted = Discounted(self.table.mdp.P_pi(distribution), self.table.mdp.gamma)
+        return np.maximum(discounted.solve((distribution * self._own).sum(axis=1)), 0.0)
+
+    @property
+    def best(self) -> Matrix:
+        """(S, A) `policy`."""
+        return np.eye(self.blocked.shape[1])[self.policy]
+
+    @property
+    def _own(self) -> Matrix:
+        """(S, A) the rounding of the table's numbers in a single step: of its terms, and of rows that do not sum to 1."""
+        return TIED * self.advantages.size + self.advantages.defects
 
     def tied(self) -> ActionSets:
         """(S, A) the actions that a policy may take for the best: tied, and the closer the more steps pay for it."""

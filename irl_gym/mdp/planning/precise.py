@@ -48,6 +48,8 @@ class Advantages:
     """(S, A) they are within this of the exact ones of the table's own numbers."""
     size: Matrix
     """(S, A) the sum of |terms| they are made of: what relative errors of the table's numbers would scale with."""
+    defects: Matrix
+    """(S, A) what of it is c d: no reward's doing, but that of rows which do not sum to 1."""
 
     @property
     def high(self) -> Matrix:
@@ -103,12 +105,12 @@ class PreciseTable:
         mdp = self.mdp
         pairs, h = np.arange(mdp.P.shape[0]), np.abs(W.differences.astype(np.float64))
         values = self.gains(W, pairs, self._P)
-        scale = abs(W.constant) * ((1 - mdp.gamma) + mdp.gamma * np.abs(self._defects.astype(np.float64)))
-        size = self._paid + scale + mdp.gamma * (mdp.P @ h) + h[pairs // mdp.n_actions]
-        size = np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, size)
+        defects = abs(W.constant) * mdp.gamma * np.abs(self._defects.astype(np.float64))
+        size = self._paid + abs(W.constant) * (1 - mdp.gamma) + defects + mdp.gamma * (mdp.P @ h) + h[pairs // mdp.n_actions]
+        size, defects = (np.where(np.repeat(mdp.terminal, mdp.n_actions), 0.0, one) for one in (size, defects))
         shape = (mdp.n_states, mdp.n_actions)
         rounding = _upwards(self.terms * (EPSILON_LONG * size + abs(W.constant) * 2.0**-106))
-        return Advantages(values.reshape(shape), rounding.reshape(shape), size.reshape(shape))
+        return Advantages(*(one.reshape(shape) for one in (values, rounding, size, defects)))
 
     def refined(self, V: Vector, policy: Actions, discounted: Discounted) -> Split:
         """The values of a policy (S,), from those that float64 found, by a few corrections."""

@@ -69,8 +69,14 @@ def at_odds(
     for what, name, found in (("reward", RETRAINED, rewarded), ("policy", LEARNED, learned.get("policy", False))):
         if (name in metrics["policies"]) is not found:
             yield f"metrics.json and .stages/reward.json do not agree on whether a {what} was learned; {mend}"
-    if metrics.get("table") is None and "table.npz" in there:
-        yield f"metrics.json tells of no table, and table.npz is there; {mend}"
+    if metrics.get("table") is None:
+        if "table.npz" in there:
+            yield f"metrics.json tells of no table, and table.npz is there; {mend}"
+        if certificate["optimality"] is not None:
+            what = (
+                "certificate.json says whether the expert is optimal, which only a table tells, and metrics.json tells of none"
+            )
+            yield f"{what}; delete certificate.json and metrics.json, and they are made again"
     if not rewarded and (certificate["optimality"] is not None or "reward.npz" in there):
         what = "no agent was retrained, but certificate.json or reward.npz is of a reward"
         yield f"{what}; delete certificate.json and metrics.json, and they are made again"

@@ -14,6 +14,7 @@ from irl_gym.judging.ambiguity.feasible import feasible_reward, membership, samp
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_evaluation, policy_iteration
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -141,6 +142,14 @@ def test_zero_is_a_member_with_ties():
     model = models.paper_grid()
     found = membership(model.mdp, model.expert, np.zeros(25))
     assert found.member and "24 of 24 states" in str(found)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_drowns_in_rounding_near_gamma_1_is_undecided_and_no_tie(sign):
+    model = models.random_model(0)
+    mdp = TabularMDP(model.mdp.P, 1 - 1e-6, model.mdp.d0)
+    found = membership(mdp, model.expert, 1 + sign * 1e-9 * model.R)
+    assert found.member is None and found.undecided and not found.ties and "rounding hides" in str(found)
 
 
 def test_membership_agrees_with_the_certificate():

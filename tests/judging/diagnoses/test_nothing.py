@@ -7,8 +7,12 @@ import pytest
 from models import paper_grid, random_model, ring
 from patients import contradicted, corridor, finding, judged, names, right
 
+from irl_gym.judging.diagnoses.case import Case
+from irl_gym.judging.diagnoses.doctor import diagnose
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
+from irl_gym.mdp.rewards import TabularReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
 
 GRID = paper_grid()
 
@@ -96,3 +100,11 @@ def test_a_constant_price_of_steps_is_a_reward_where_episodes_end():
 def test_the_defaults_mend_a_flat_reward():
     model = random_model(0)
     assert names(FiniteLP().fit(model.mdp, model.expert), model.mdp, model.expert) == ()
+
+
+@pytest.mark.parametrize("gamma", [1 - 1e-9, 1 - 1e-12])
+def test_a_reward_that_drowns_in_rounding_is_not_said_to_pay_alike(gamma):
+    model = random_model(0)
+    case = Case(mdp=TabularMDP(model.mdp.P, gamma, model.mdp.d0), expert=model.expert, reward=TabularReward(model.R))
+    said = {one.name: one.sentence for one in diagnose(case).findings}["flat-reward"]
+    assert "No action is certainly better than another" in said and not case.margins.size

@@ -18,6 +18,7 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.runs.certificates import claims_in, facts_in
 from irl_gym.runs.diagnosed import diagnose_run
+from irl_gym.runs.reading.belonging import at_odds
 from irl_gym.runs.reading.verified import again, claims, recomputed, shares, with_again
 from irl_gym.runs.run import read_run
 from irl_gym.runs.supply import supplied
@@ -153,6 +154,13 @@ def test_metrics_that_hide_the_table_are_refused(unvouched):
     write_json(unvouched / "metrics.json", {**read_json(unvouched / "metrics.json"), "table": None})
     with pytest.raises(RunIncomplete, match=r"tells of no table, and table\.npz is there; delete metrics\.json"):
         read_run(unvouched)
+
+
+@pytest.mark.parametrize(("judged", "faults"), [({"expert_optimal": True}, 1), (None, 0)])
+def test_a_verdict_that_only_a_table_gives_is_refused_where_there_is_none(judged, faults):
+    learned = {"files": ["reward.npz"], "policy": False}
+    found = [*at_odds(learned, {"policies": {"retrained": {}}, "table": None}, {"optimality": judged}, {"reward.npz"})]
+    assert len(found) == faults and all("which only a table tells" in one for one in found)
 
 
 def test_values_by_episodes_are_said_to_be_the_record_s(run):

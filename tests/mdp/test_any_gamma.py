@@ -1,4 +1,4 @@
-"""What a reward says of an expert at any discount and in any units: it never contradicts itself, nor takes rounding for more."""
+"""What a reward says of an expert at any discount and size: it never contradicts itself, nor takes rounding for more."""
 
 import models
 import numpy as np

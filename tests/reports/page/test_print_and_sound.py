@@ -46,7 +46,7 @@ def test_the_style_alone_makes_paper_light(page):
 
 def test_buttons_of_the_players_are_told_apart(page):
     names = page.evaluate("[...document.querySelectorAll('.player button')].map(one => one.ariaLabel)")
-    assert len(set(names)) == len(names) == 8 and {"Expert: one step back", "Retrained agent: play"} <= set(names)
+    assert len(set(names)) == len(names) == 10 and {"Expert: one step back", "Retrained agent: play"} <= set(names)
 
 
 def test_a_step_by_hand_is_read_out_and_a_film_is_not(page):

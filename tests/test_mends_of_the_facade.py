@@ -81,6 +81,9 @@ CASES: list[tuple[str, Callable, Callable]] = [
      lambda: [irl_gym.plot(np.ones((16, 4)), LAKE, kind=one) for one in ("reward", "occupancy")]),
     ("Give a table besides, as `table`.", lambda: irl_gym.plot(RESULT, TABLE), lambda: irl_gym.plot(RESULT, LAKE, table=TABLE)),
     ("Learn one, such as with `FiniteLP().fit(mdp, expert)`.", lambda: learned(COPIED), lambda: learned(RESULT)),
+    ("Make one, such as `irl_gym.Experiment('FrozenLake-v1', gamma=0.99)`.",
+     lambda: irl_gym.recover_and_retrain("FrozenLake-v1", "nowhere"),
+     lambda: irl_gym.Experiment("FrozenLake-v1", gamma=0.99)),
     ("Give the Tabulation of this environment.", lambda: learned(RESULT, env=CLIFF, shaping=TABLE),
      lambda: learned(RESULT, shaping=TABLE)),
 ]  # fmt: skip

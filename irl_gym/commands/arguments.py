@@ -143,7 +143,7 @@ class Arguments:
     """How the table of its transitions is made."""
     demonstrations: Demonstrations = Demonstrations()
     """Who shows what is wanted."""
-    log: Log = field(default_factory=Log)
+    file: Log = field(default_factory=Log)
     """Or episodes in a file."""
     learning: Learning = field(default_factory=Learning)
     """How the reward is recovered."""
@@ -165,15 +165,15 @@ class Arguments:
         shown = self.demonstrations
         if self.environment.env_id is None:
             raise InvalidParameter(
-                f"csv is {self.log.csv}, and no environment is named: expected the one that it was recorded in. Name it with "
+                f"csv is {self.file.csv}, and no environment is named: expected the one that it was recorded in. Name it with "
                 "--env-id."
             )
         if shown.dataset is not None or shown.expert is not None or shown.epsilon:
             raise InvalidParameter(
-                f"csv is {self.log.csv}, but a dataset, an expert or epsilon is given too: expected the episodes of the file "
+                f"csv is {self.file.csv}, but a dataset, an expert or epsilon is given too: expected the episodes of the file "
                 "as they are. Leave the others out."
             )
-        return replace(self, log=Log(), demonstrations=replace(shown, dataset=dataset, dataset_root=root))
+        return replace(self, file=Log(), demonstrations=replace(shown, dataset=dataset, dataset_root=root))
 
     def experiment(self) -> "Experiment":
         """What the arguments ask for.

@@ -7,12 +7,13 @@ For example:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 from rich.console import Console
 from rich.text import Text
 
-from irl_gym.commands.terminal import check_writable, exit_code, print_error, read_arguments
+from irl_gym.commands.terminal import UNSET, check_writable, exit_code, print_error, read_arguments
 from irl_gym.errors import InvalidParameter, IrlGymError
 from irl_gym.facts import harmless
 
@@ -21,7 +22,7 @@ from irl_gym.facts import harmless
 class Arguments:
     """Put several runs side by side in one page."""
 
-    runs: tyro.conf.Positional[tuple[Path, ...]]
+    runs: tyro.conf.Positional[Annotated[tuple[Path, ...], UNSET]]
     """Folders of finished runs, two or more, of one environment or of several."""
     out: Path = Path("compare.html")
     """The file."""

@@ -29,7 +29,7 @@ class Log:
     """Episodes in a file that ends in .csv, .tsv or .parquet, with a header and a row for each step."""
 
     csv: Annotated[Path | None, UNSET] = None
-    """Learn from this file; --env-id names the environment that it was recorded in. Reading it needs the extra `data`."""
+    """The file; --env-id names the environment that it was recorded in. Parquet needs the extra `data`."""
     episode_column: str = "episode"
     """Id of the episode; none: a row that is terminated or truncated ends an episode."""
     step_column: str = "step"
@@ -44,7 +44,7 @@ class Log:
     """True in the last row of an episode that the environment ended; may be missing."""
     truncated_column: str = "truncated"
     """True in the last row of an episode that a time limit ended; may be missing."""
-    next_observation_columns: tuple[str, ...] = ()
+    next_observation_columns: Annotated[tuple[str, ...], UNSET] = ()
     """What was seen after the action, where the file says it."""
     last: Last = "keep"
     """Where it does not: keep the last action of each episode, drop it, repeat its observation; or its row has none."""
@@ -77,7 +77,7 @@ class Log:
 
         Raises:
             InvalidDemonstrations: a column that is missing, or a row that cannot be right.
-            NotInstalled: no pandas, or no pyarrow for a Parquet file.
+            NotInstalled: no pyarrow for a Parquet file.
         """
         from irl_gym.demonstrations.imports import from_frame
 

@@ -33,10 +33,10 @@ def main(words: Sequence[str] | None = None) -> int:
         words: of the command line; None for those of this process.
     """
     name, *rest = (sys.argv[1:] if words is None else words) or ["--help"]
-    if name in ("-h", "--help"):
+    if name in ("-h", "--help", "help"):
         print(usage())
         return 0
-    if name == "--version":
+    if name in ("--version", "-V", "version"):
         print(f"irl-gym {importlib.metadata.version('irl_gym')}")
         return 0
     try:

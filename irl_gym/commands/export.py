@@ -66,7 +66,7 @@ class Arguments:
     """One file; or a folder an episode, which needs the extra `data`."""
     root: Annotated[Path | None, UNSET] = None
     """Minari's root folder; the default is the one in force."""
-    log: Log = field(default_factory=Log)
+    file: Log = field(default_factory=Log)
     """Or episodes in a file, in place of an expert's."""
 
     def check_no_expert(self) -> None:
@@ -78,7 +78,7 @@ class Arguments:
         for one in fields(self):
             if one.name in OF_EXPERT and getattr(self, one.name) != one.default:
                 raise InvalidParameter(
-                    f"csv is {self.log.csv}, but {one.name} is {getattr(self, one.name)!r}: expected the episodes of the file "
+                    f"csv is {self.file.csv}, but {one.name} is {getattr(self, one.name)!r}: expected the episodes of the file "
                     "as they are. Leave the others out."
                 )
 
@@ -131,11 +131,11 @@ def exported(arguments: Arguments) -> tuple[Any, str | None]:
     keywords, reveal = parse_keywords(arguments.env_kwargs), parse_reveal(arguments.reveal)
     env = environment_of(arguments.env_id, keywords, start_seeds=arguments.start_seeds, reveal=reveal)
     lost = unkept(env.spec)
-    if arguments.log.csv is not None:
+    if arguments.file.csv is not None:
         arguments.check_no_expert()
-        episodes = arguments.log.episodes(env)
+        episodes = arguments.file.episodes(env)
         how = {"data_format": arguments.format}
-        return arguments.log.write(episodes, env, arguments.dataset_id, arguments.root, **how), lost
+        return arguments.file.write(episodes, env, arguments.dataset_id, arguments.root, **how), lost
     metadata = {**recording.metadata(arguments.env_id), "code_permalink": "irl-gym export"}
     if lost:
         metadata["description"] += f" {lost}"

@@ -7,11 +7,11 @@ For example:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from irl_gym.commands.terminal import exit_code, print_error, print_table, read_arguments
+from irl_gym.commands.terminal import UNSET, exit_code, print_error, print_table, read_arguments
 from irl_gym.errors import IrlGymError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ VARIABLES = (("demonstrations", "expert"), ("environment", "dynamics"), ("oracle
 class Arguments:
     """List the learners, and what each has to be given."""
 
-    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    names: tyro.conf.Positional[Annotated[tuple[str, ...], UNSET]] = ()
     """Learners of your own beside those that are built in, as module:Class."""
     markdown: bool = False
     """As a table in Markdown."""

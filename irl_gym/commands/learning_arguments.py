@@ -1,12 +1,12 @@
 """What the loop's command line asks for of learners: which one, and its options; an option of another one is refused."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_type_hints
 
-from tyro.conf import Suppress
+from tyro.conf import Suppress, arg
 
 from irl_gym.commands.terminal import UNSET
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, UnknownLearner
 from irl_gym.runs.choices import TAKEN, FeatureName, PlannerName
 
 if TYPE_CHECKING:
@@ -24,9 +24,10 @@ class Learning:
     """How the reward is recovered."""
 
     learner: str = "finite-lp"
-    """finite-lp, feature-lp, trajectory-lp (Ng & Russell's sections 3 to 5), or module:Class; with --help its options show."""
+    """finite-lp, feature-lp, trajectory-lp (Ng & Russell's sections 3 to 5), one more that `irl-gym learners` lists, or
+    module:Class of your own; with --help its options show."""
     options: Annotated[tuple[str, ...], UNSET] = ()
-    """Of a learner of your own: name=value ..., or one json object."""
+    """Of any other learner: name=value ..., or one json object."""
     l1: float | Literal["auto"] = 0.0
     """Price of ||R||_1, of ||alpha||_1 with features: a number, or auto for just below lambda_0 (finite-lp)."""
     margin_cap: float | Literal["auto", "none"] = "auto"
@@ -119,9 +120,34 @@ def taken_by_own(needs: "Needs | None") -> tuple[str, ...]:
 
 def for_help(learner: str) -> type[Learning]:
     """The record without the options that a learner has not: what --help shows."""
-    hints, taken = get_type_hints(Learning, include_extras=True), TAKEN.get(learner) or taken_by_own(None)
+    hints, taken, own = get_type_hints(Learning, include_extras=True), TAKEN.get(learner), dict[str, Any]()
+    if taken is None:
+        kind = _found(learner)
+        taken = taken_by_own(None if kind is None else kind.needs)
+        own = {name: Annotated[hints[name], arg(help=_told(kind))] for name in ("options",)}
     others = [one for one in fields(Learning) if one.name not in ("learner", *taken)]
     made = {one.name: one.default for one in others}
     hidden = {one.name: Annotated[hints[one.name], Suppress] for one in others}
-    told = {"__doc__": Learning.__doc__, "__module__": Learning.__module__, "__annotations__": hidden}
+    told = {"__doc__": Learning.__doc__, "__module__": Learning.__module__, "__annotations__": hidden | own}
     return dataclass(frozen=True)(type("Learning", (Learning,), {**told, **made}))
+
+
+def _found(learner: str) -> type[Any] | None:
+    """The class of a learner; None where there is none of that name, which a run says."""
+    from irl_gym.learners.registry import learner_class
+
+    try:
+        return learner_class(learner)
+    except UnknownLearner:
+        return None
+
+
+def _told(kind: type[Any] | None) -> str:
+    """What --help says of the options of a learner: each of its fields."""
+    from irl_gym.records import documented
+
+    how = "name=value ..., or one json object."
+    if kind is None or not is_dataclass(kind):
+        return how
+    each = [f"{name}: {' '.join(text.split())}" for name, text in documented(kind).items()]
+    return "\n".join([how, *each]) if each else f"{how} {kind.__name__} has none."

@@ -42,7 +42,7 @@ class Arguments:
     """Minari's root folder; the default is Minari's own."""
     mode: Literal["terminal", "window"] = "terminal"
     """Show it in the terminal, or in a window."""
-    keys: str = ""
+    keys: Annotated[str, UNSET] = ""
     """Keys of your own, such as "w=3,a=0,space=2": key=action, counted from 0. Press ? to see all."""
     seed: int = 0
     """Of the first attempt; each further one has the next."""

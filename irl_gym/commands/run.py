@@ -33,8 +33,7 @@ STOPPED = 130
 
 def command(words: Sequence[str]) -> int:
     """The subcommand: what it exits with."""
-    asked = read_arguments(_kind(words), words, "run", __doc__)
-    return exit_code(lambda: _called(asked, words), others=OTHERS)
+    return exit_code(lambda: _called(read_arguments(_kind(words), words, "run", __doc__), words), others=OTHERS)
 
 
 def main(arguments: Arguments, command: Sequence[str]) -> int:
@@ -134,7 +133,7 @@ def _kept(arguments: Arguments, shared: Path) -> "tuple[Experiment, Path]":
     from irl_gym.runs.identity import claim
     from irl_gym.runs.named_parts import environment_of
 
-    log = arguments.log
+    log = arguments.file
     if log.csv is None:
         asked = arguments.experiment()
         return asked, arguments.out or Path("runs") / asked.name
@@ -167,7 +166,7 @@ def _name(arguments: Arguments) -> str:
     from irl_gym.runs.experiment import digest_of
     from irl_gym.runs.pooling import without_seeds
 
-    log = arguments.log
+    log = arguments.file
     asked = (arguments if log.csv is None else arguments.learning_from(log.dataset_id, None)).experiment()
     return f"{asked.name.rpartition('-')[0]}-{digest_of(without_seeds(asked.to_json()))}-seeds"
 

@@ -5,7 +5,7 @@ import difflib
 import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -35,7 +35,25 @@ def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, a
         subcommand: its name.
         about: what --help says first.
     """
-    return tyro.cli(kind, args=[*words], prog=f"irl-gym {subcommand}", description=about, config=OPTIONS)
+    return tyro.cli(kind, args=named_first(kind, words), prog=f"irl-gym {subcommand}", description=about, config=OPTIONS)
+
+
+FIRST = ("env_id", "run", "environment")
+"""Options, or the group that has one, that the first word gives where it names none: `irl-gym run FrozenLake-v1`."""
+
+
+def named_first(kind: type, words: Sequence[str]) -> list[str]:
+    """The words, with the option's name before a first one that has none.
+
+    Args:
+        kind: the record of the options; one that takes words without names is given them as they are.
+        words: of the command line.
+    """
+    known = {one.name for one in fields(kind)}
+    found = next((name for name in FIRST if name in known), None)
+    if found is None or not words or words[0].startswith("-"):
+        return [*words]
+    return ["--run" if found == "run" else "--env-id", *words]
 
 
 def checked_name(what: str, name: str, known: Collection[str]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from irl_gym.environments.reveal import shown_by
+from irl_gym.errors import InvalidParameter
 from irl_gym.files.own_files import held
 from irl_gym.loop.loop import Loop
 from irl_gym.loop.stages import OnProgress
@@ -47,6 +48,7 @@ def recover_and_retrain(
         command: the command that reproduces the run, kept in run.json; None where it is started from Python.
 
     Raises:
+        InvalidParameter: no experiment.
         UnknownEnvironment, NotTabular, NotDiscrete, TableMismatch: no table can be made, and the learner needs one.
         DatasetMissing, DatasetMismatch: no such dataset, or one of another environment.
         DegenerateExpert: no reward prefers the expert's actions.
@@ -56,6 +58,11 @@ def recover_and_retrain(
         RunNewer: the folder holds a run of a newer version.
         WriteFailed: the disk became full, or the folder was deleted meanwhile.
     """
+    if not isinstance(experiment, Experiment):
+        raise InvalidParameter(
+            f"experiment is a {type(experiment).__name__}: expected an Experiment. Make one, such as "
+            "`irl_gym.Experiment('FrozenLake-v1', gamma=0.99)`."
+        )
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):
         loop = Loop(experiment, out, on_progress, command)
         stages = {"table": {"seconds": loop.table_seconds}} | {name: loop.stage(name) for name in STAGES}

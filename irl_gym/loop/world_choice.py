@@ -1,6 +1,8 @@
 """Where an experiment takes place: a table, exact or of cells; else the environment, which is stepped."""
 
-from collections.abc import Callable
+import json
+import shlex
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +17,15 @@ from irl_gym.errors import (
     HiddenState,
     InvalidParameter,
     NotDiscrete,
+    NotSettable,
     NotTabular,
 )
 from irl_gym.learners.needs import PARTS
 from irl_gym.loop.table_world import TableWorld, step_limit
 from irl_gym.loop.worlds import RunWorld, SteppedWorld
 from irl_gym.runs.experiment import Experiment
+from irl_gym.runs.identity import PROGRAM
+from irl_gym.spaces.coordinates import coordinates_of
 from irl_gym.tables.discretize import discretize
 from irl_gym.tables.enumeration.table import Enumeration
 from irl_gym.tables.table_files import UNDER_WAY, kept_table
@@ -32,6 +37,8 @@ ON_COMMAND_LINE: dict[type[Exception], str] = {
     EnumerationLimit: "(On the command line: --max-states, with --out naming the same folder.)",
 }
 """How the mends of errors are asked for there."""
+CELLS = 1000
+"""Of a table that is offered, about: a run of so many takes a minute."""
 
 
 def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float | None, str], None]) -> RunWorld:
@@ -68,7 +75,7 @@ def place_of(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float |
             raise
         of_table = asked.learner.needs.lacking({*PARTS} - {"dynamics", "reward"})
         if of_table is not None or getattr(asked.learner, "on_rows", False):
-            raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env)}") from error
+            raise type(error)(f"no table of {asked.env_id or asked.dataset}: {error}{_instead(error, env, asked)}") from error
         world = SteppedWorld(env, asked.gamma, asked.num_envs or 8, asked.eval_episodes, seed)
         for name in ("expert", "inner", "retrain"):
             _check_stepping(name, getattr(asked, name), env)
@@ -88,19 +95,37 @@ def _check_stepping(name: str, planner: Planner | None, env: gym.Env) -> None:
         )
 
 
-def _instead(error: NotTabular | NotDiscrete, env: gym.Env) -> str:
+def _instead(error: NotTabular | NotDiscrete, env: gym.Env, asked: Experiment) -> str:
     """What else can be asked for where no table was made: only what does not lead to the same error."""
-    space, kind = env.observation_space, type(error)
+    space, kind, command = env.observation_space, type(error), _command(asked)
     ways = []
     if kind in ON_COMMAND_LINE:
         ways.append(ON_COMMAND_LINE[kind])
     elif kind is NotTabular:
         ways.append("Or count what random steps do (--table sample).")
     elif kind is NotDiscrete and isinstance(space, spaces.Box) and space.dtype.kind == "f":
-        ways.append("Or give bins, for cells (--bins), if its state can be set.")
+        each = max(2, int(CELLS ** (1 / max(1, len(_coordinates(env))))))
+        ways.append(f"Or make a table of cells, if its state can be set: `{command} --bins {each}`.")
     if kind is not EnvironmentFailed and isinstance(space, spaces.Box | spaces.Discrete | spaces.MultiDiscrete):
-        ways.append("Or learn from episodes alone, with TrajectoryLP (--learner trajectory-lp).")
+        ways.append(f"Or learn from episodes alone, with TrajectoryLP: `{command} --learner trajectory-lp`.")
     return "".join(f" {way}" for way in ways)
+
+
+def _coordinates(env: gym.Env) -> Sequence[str]:
+    """Names of what cells divide."""
+    try:
+        return coordinates_of(env.unwrapped).names
+    except NotSettable:
+        return ()
+
+
+def _command(asked: Experiment) -> str:
+    """The command of a run in the same place, whose other options are the defaults."""
+    where = [("--env-id", asked.env_id), ("--dataset", asked.dataset), ("--dataset-root", asked.dataset_root)]
+    words = [*PROGRAM, *(word for flag, value in where if value is not None for word in (flag, str(value)))]
+    if asked.env_kwargs:
+        words += ["--env-kwargs", json.dumps(dict(asked.env_kwargs))]
+    return shlex.join(words)
 
 
 def _table(asked: Experiment, env: gym.Env, out: Path, tell: Callable[[float | None, str], None]) -> Tabulation:

@@ -70,6 +70,8 @@ def highs(program: NativeProgram, options: dict[str, Any], until: float) -> Any:
     """What HiGHS says of a program, as cvxpy reads it."""
     import highspy
 
+    from irl_gym.programs.silent_highs import SilentHighs
+
     c, A, b, equations, lower, upper = program
     lp: Any = highspy.HighsLp()
     lp.num_row_, lp.num_col_ = A.shape
@@ -79,8 +81,8 @@ def highs(program: NativeProgram, options: dict[str, Any], until: float) -> Any:
     lp.col_upper_ = np.full(c.size, highspy.kHighsInf) if upper is None else upper
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = A.indptr, A.indices, A.data
-    solver: Any = highspy.Highs()
-    for name, value in ({"log_to_console": False} | options).items():
+    solver: Any = SilentHighs()
+    for name, value in options.items():
         solver.setOptionValue(name, value)
     solver.passModel(lp)
     if until < math.inf:

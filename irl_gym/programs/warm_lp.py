@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from irl_gym._typing import Sparse
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 from irl_gym.programs.deadline import NEVER, Deadline
+from irl_gym.programs.silent_highs import SilentHighs
 
 TOLERANCE = 1e-9
 """Of primal and dual feasibility, absolute."""
@@ -78,9 +79,9 @@ class WarmLP:
         lp.a_matrix_.value_ = by_column.data
         self.columns = np.arange(columns, dtype=np.int32)
         self.deadline = deadline
-        self.highs = highspy.Highs()
+        self.highs = SilentHighs()
         options: dict[str, Any] = {
-            "output_flag": False, "threads": 1, "presolve": "off", "solver": "simplex", "simplex_strategy": PRIMAL_SIMPLEX,
+            "threads": 1, "presolve": "off", "solver": "simplex", "simplex_strategy": PRIMAL_SIMPLEX,
             "primal_feasibility_tolerance": TOLERANCE, "dual_feasibility_tolerance": TOLERANCE,
         }  # fmt: skip
         if not perturbed:

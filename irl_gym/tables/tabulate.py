@@ -43,6 +43,8 @@ OWN_ENVIRONMENTS = (
 )  # fmt: skip
 """Offered by name to who mistypes them; importing their module is what registers them."""
 
+NO_WORLDS = ("GymV21Environment-v0", "GymV26Environment-v0")
+"""What Gymnasium registers that stands for nothing by itself: nobody means it."""
 Source = Callable[[gym.Env, float], Tabulation | None]
 
 
@@ -146,15 +148,23 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(module)}") from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
             raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
-        known = {one.rpartition(":")[2]: one for one in (*gym.registry, *OWN_ENVIRONMENTS)}
+        known = {one: f"{module}:{one}" if _made_by(module, one) else one for one in gym.registry if one not in NO_WORLDS}
+        known |= {one.rpartition(":")[2]: one for one in OWN_ENVIRONMENTS}
         close = [known[match] for match in difflib.get_close_matches(name, known, n=3, cutoff=0.5)]
         offer = f" The closest are {', '.join(close)}." if close else ""
         if name.startswith(("MiniGrid-", "BabyAI-")):
             offer = " MiniGrid's tasks are irl_gym_envs:irl_gym/MiniGrid-v0 with env_kwargs such as task=DoorKey-6x6."
         raise UnknownEnvironment(
             f"environment {env_id!r} is not registered: expected an id such as 'FrozenLake-v1'.{offer} An environment of "
-            "another package needs its module named first, as in 'irl_gym_envs:irl_gym/GridWorld-v0'."
+            "another package, or of a file of your own, needs its module named first, as in 'my_env:MyEnv-v0' for my_env.py."
         ) from error
+
+
+def _made_by(module: str, env_id: str) -> bool:
+    """Does a module make an environment, so that it is named by it?"""
+    entry = gym.registry[env_id].entry_point
+    where = entry.partition(":")[0] if isinstance(entry, str) else getattr(entry, "__module__", "")
+    return bool(module) and where.split(".")[0] == module.split(".")[0]
 
 
 def _check_named(env_id: str, error: Exception, kwargs: dict[str, Any]) -> None:

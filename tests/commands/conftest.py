@@ -4,6 +4,7 @@ import re
 import sys
 from types import SimpleNamespace
 
+import gymnasium
 import pytest
 
 MODULES = {
@@ -52,6 +53,7 @@ def here(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.setattr(sys, "modules", sys.modules)
     yield tmp_path
+    gymnasium.registry.pop("Pond-v0", None)
     for name in MODULES:
         sys.modules.pop(name, None)
 

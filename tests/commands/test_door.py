@@ -2,7 +2,9 @@
 
 import importlib.metadata
 import os
+import re
 import resource
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -26,6 +28,21 @@ for name in (*door.SUBCOMMANDS, "no-such-subcommand"):
         with contextlib.suppress(SystemExit):
             door.main([name, *(["ng-russell-2000"] if name == "reproduce" else []), more])
 print("loaded", *{one.partition(".")[0] for one in sys.modules})
+"""
+TUNED = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from irl_gym.learners.needs import Needs
+
+@dataclass(frozen=True)
+class Tuned:
+    needs: ClassVar = Needs(("dynamics",))
+    power: float = 1.0
+    \"\"\"How much often counts.\"\"\"
+    times: int = 2
+
+    def learn(self, problem, rng): ...
 """
 FEW = ("--episodes", "5", "--retrain", "value-iteration")
 
@@ -67,7 +84,7 @@ def test_the_console_script_is_the_door():
 def test_help_names_every_subcommand(irl_gym):
     done = irl_gym("--help")
     assert done.code == 0 and [name for name in door.SUBCOMMANDS if f"\n  {name} " not in done.out] == []
-    assert irl_gym().out == done.out
+    assert irl_gym().out == irl_gym("help").out == done.out
 
 
 def test_the_version_is_told(irl_gym):
@@ -85,6 +102,9 @@ def test_the_version_is_told(irl_gym):
         (("run", "--env-id", "FrozenLaek-v1"), "The closest are FrozenLake"),
         (("run", "--learner", "finte-lp"), "Did you mean 'finite-lp'?"),
         (("doctor", "--rum", "runs/demo"), "--run PATH"),
+        (("run", "FrozenLaek-v1"), "The closest are FrozenLake"),
+        (("doctor", "runs/nowhere"), "RunIncomplete: runs/nowhere holds no run"),
+        (("tabulate", "own_env_here:Pond-v1"), "The closest are own_env_here:Pond-v0"),
     ],
 )
 def test_what_is_mistyped_is_offered_as_it_is_spelled(irl_gym, words, says):
@@ -105,6 +125,33 @@ def test_help_shows_the_options_of_the_learner_that_is_named_and_no_others(irl_g
     for words in (("--learner", learner), (f"--learner={learner}",)):
         said = irl_gym("run", *words, "--help").out
         assert f"{has} " in said and f"{lacks} " not in said and "--retrain " in said
+
+
+def test_help_lists_the_fields_of_a_learner_of_ones_own(irl_gym, here):
+    (here / "own_learner_here.py").write_text(TUNED)
+    said = " ".join(irl_gym("run", "--learner", "own_learner_here:Tuned", "--help").out.replace("│", " ").split())
+    assert "or one json object. power: How much often counts. times: int" in said and "--features " not in said
+
+
+def test_help_names_the_options_of_a_file_as_such_and_no_empty_default(irl_gym):
+    said = irl_gym("run", "--help").out
+    assert "file options" in said and "log options" not in said and "(default: )" not in said + irl_gym("compare", "--help").out
+
+
+def test_a_first_word_without_a_name_is_what_the_subcommand_is_of(irl_gym, here):
+    done = irl_gym("tabulate", "own_env_here:Pond-v0", "--out", "pond.npz")
+    assert done.code == 0 and "4, 4 reachable" in done.out and (here / "pond.npz").exists()
+
+
+@pytest.mark.slow
+def test_a_continuous_world_is_told_with_two_commands_that_run(irl_gym, here):
+    said = irl_gym("run", "--env-id", "MountainCar-v0", "--env-kwargs", "goal_velocity=0.01").errors
+    told = [shlex.split(one)[1:] for one in re.findall(r"`(irl-gym [^`]*)`", said)]
+    assert [one[-2:] for one in told] == [["--bins", "31"], ["--learner", "trajectory-lp"]]
+    few = (("--retrain", "value-iteration"), ("--total-timesteps", "2048", "--rounds", "1"))
+    for words, less in zip(told, few, strict=True):
+        done = irl_gym(*words, *less, "--episodes", "2")
+        assert done.code == 0 and "Under the true reward" in done.out, done.errors
 
 
 def test_the_users_own_modules_are_found_where_the_user_stands(here):

@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from irl_gym.errors import InvalidParameter, SolverFailed, SolverInfeasible, SolverTimeout
 from irl_gym.judging.ambiguity.widths import feasible_widths
 from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.silent_highs import SilentHighs
 from irl_gym.programs.warm_lp import WarmLP
 
 
@@ -126,3 +127,10 @@ def test_a_program_that_starts_from_another_s_end_has_nothing_left_to_do():
     assert first.minimise(np.ones(12)).iterations > 0
     second.start_from(first)
     assert second.minimise(np.ones(12)).iterations == 0
+
+
+def test_highs_is_silent_from_its_first_moment(capfd):
+    solver = SilentHighs()
+    solver.setOptionValue("threads", 1)
+    solver.run()
+    assert solver.getOptionValue("output_flag")[1] is False and capfd.readouterr().out == ""

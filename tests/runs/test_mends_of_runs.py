@@ -101,9 +101,9 @@ CASES = [
     ("Use SB3 as planner.",
      lambda path: kept_agent(path, stepped().random),
      lambda path: kept_agent(path, Agent(PPO("MlpPolicy", CAR, device="cpu")))),
-    ("Or give bins, for cells (--bins), if its state can be set.",
+    ("Or make a table of cells, if its state can be set",
      lambda path: place(path, CAR), lambda path: isinstance(place(path, CAR, bins=3), TableWorld)),
-    ("Or learn from episodes alone, with TrajectoryLP (--learner trajectory-lp).",
+    ("Or learn from episodes alone, with TrajectoryLP",
      lambda path: place(path, CAR), lambda path: isinstance(place(path, CAR, **STEPPED), SteppedWorld)),
     ("Make one of a seed: `np.random.default_rng(0)`.",
      lambda _: checked_rng(0), lambda _: checked_rng(eval(mends(told(checked_rng, 0))[0], {"np": np}))),
@@ -177,6 +177,7 @@ def test_a_mend_that_the_folder_of_a_run_names_serves(finished, unvouched, says,
 FILES = [f"{one}.py" for one in ("experiment", "world_choice", "worlds", "run_reader", "runs/run", "identity", "checks",
                                  "terminal", "verified", "pipeline", "closing")]  # fmt: skip
 ELSEWHERE = [
+    "Make one, such as `irl_gym.Experiment('FrozenLake-v1', gamma=0.99)`.",  # test_mends_of_the_facade
     "Wrap a function of observations in `irl_gym.agents.experts.Acting`.",  # test_mends_of_experts
     "Delete it, and it is written again.",  # test_vouched_files
     "The same command continues it: python",  # test_vouched_files, test_runs

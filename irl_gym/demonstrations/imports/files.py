@@ -35,16 +35,12 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
 
     Raises:
         InvalidParameter: something else than a frame or such a file.
-        NotInstalled: no pandas, or no pyarrow for a Parquet file.
+        NotInstalled: no pyarrow for a Parquet file.
         DatasetMissing: no such file.
         InvalidDemonstrations: a file that cannot be read, or a column that is not there.
     """
-    try:
-        import pandas as pd
-    except ImportError as error:
-        raise NotInstalled(
-            'data frames need pandas, which is missing: expected it installed. pip install "irl_gym[data]".'
-        ) from error
+    import pandas as pd
+
     if isinstance(source, pd.DataFrame):
         _check_columns("the frame", list(source.columns), columns, optional)
         return source, lambda row: f"row {row + 1} (index {source.index[row]})"

@@ -83,7 +83,7 @@ def from_frame(
             without the header, with its line in a CSV file.
         DatasetMissing: no such file.
         InvalidParameter: spaces that are missing, or another kind of source.
-        NotInstalled: no pandas, or no pyarrow for a Parquet file.
+        NotInstalled: no pyarrow for a Parquet file.
         NotDiscrete: continuous actions.
     """
     how = reading(space, n_actions, action_space, env, last)

@@ -23,6 +23,8 @@ from irl_gym.files.own_files import LOCK, digest, scratch, write_bytes
 from irl_gym.files.run_schema import RECORDS_OF, Stage, checked
 
 NOT_THE_SAME = "is not the file that the run left, by its sha256: it was changed, damaged, or copied from another run"
+LONGEST = 255
+"""Bytes of a file's name in a record; file systems have no longer ones."""
 DEEPEST = 100
 """Objects and lists inside each other."""
 STAGE_RECORDS = ".stages"
@@ -112,7 +114,8 @@ def checked_record(folder: Path, stage: str) -> dict[str, Any]:
     """
     record = read_json(folder / STAGE_RECORDS / f"{stage}.json", RECORDS_OF.get(stage, Stage))
     for name in (*record["files"], *record.get("sha256", {})):
-        if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+        long = len(name.encode("utf-8", "surrogatepass")) > LONGEST
+        if long or Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
             raise DamagedFile(f"it is of {name!r:.80}: expected a file in the folder")
     return record
 

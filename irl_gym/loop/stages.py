@@ -162,7 +162,7 @@ def retrained_agent(
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
     paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
-    kept = Checkpoint(under_way(path, "agent"), {"config": config, "reward": solved["sha256"]})
+    kept = Checkpoint(under_way(path, "agent"), {"config": config, "reward": solved.get("sha256", {})})
     kept.seen = glances = Glances(world, _telling(report_progress, "agent", retrainer, kept))
     log = folder / LOGS / "retrained"
     policy = world.train(logged(retrainer, log, kept), paid, glances.see)

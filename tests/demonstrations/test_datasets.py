@@ -119,7 +119,7 @@ def test_a_malformed_id_is_refused(episodes, env, tmp_path, wrong):
 
 def test_a_dataset_of_another_environment_is_refused(root):
     with pytest.raises(DatasetMismatch, match=r"Discrete\(16\).*Discrete\(64\)"):
-        next(read_minari(ID, root=root, states=StateIndex(spaces.Discrete(64))))
+        next(iter(read_minari(ID, root=root, states=StateIndex(spaces.Discrete(64)))))
 
 
 def test_a_dataset_of_the_same_environment_is_read(root, env):
@@ -128,7 +128,7 @@ def test_a_dataset_of_the_same_environment_is_read(root, env):
 
 def test_a_dataset_of_an_environment_made_otherwise_is_refused(root):
     with pytest.raises(DatasetMismatch, match=r"is_slippery=False.*is_slippery=True"):
-        next(read_minari(ID, root=root, env=gym.make("FrozenLake-v1", is_slippery=True)))
+        next(iter(read_minari(ID, root=root, env=gym.make("FrozenLake-v1", is_slippery=True))))
 
 
 def test_continuous_actions_are_refused(tmp_path):
@@ -140,12 +140,12 @@ def test_continuous_actions_are_refused(tmp_path):
     with minari_root(tmp_path):
         minari.create_dataset_from_buffers("pendulum-v0", [one], env=env)
     with pytest.raises(NotDiscrete, match="Box"):
-        next(read_minari("pendulum-v0", root=tmp_path))
+        next(iter(read_minari("pendulum-v0", root=tmp_path)))
 
 
 def test_an_unknown_id_is_a_missing_file(tmp_path):
     with pytest.raises(FileNotFoundError):
-        next(read_minari("nothing-v0", root=tmp_path))
+        next(iter(read_minari("nothing-v0", root=tmp_path)))
 
 
 def test_a_missing_dataset_names_those_that_are_there_and_no_folder_whose_name_is_no_id(root):
@@ -260,14 +260,14 @@ def test_an_empty_dataset_is_refused_when_read(env, tmp_path):
     with minari_root(tmp_path):
         minari.create_dataset_from_buffers("empty-v0", [], env=env)
     with pytest.raises(InvalidDemonstrations, match="'empty-v0' has no episodes"):
-        next(read_minari("empty-v0", root=tmp_path))
+        next(iter(read_minari("empty-v0", root=tmp_path)))
 
 
 def test_a_wrapper_makes_another_environment(episodes, env, tmp_path):
     write(episodes, gym.wrappers.ClipReward(env, 0, 1), tmp_path)
     for other in (env, gym.wrappers.ClipReward(env, 0, 0.5)):
         with pytest.raises(DatasetMismatch, match="ClipReward"):
-            next(read_minari(ID, root=tmp_path, env=other))
+            next(iter(read_minari(ID, root=tmp_path, env=other)))
     assert sum(1 for _ in read_minari(ID, root=tmp_path, env=gym.wrappers.ClipReward(env, 0, 1))) == 5
 
 

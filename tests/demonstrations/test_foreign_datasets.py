@@ -123,7 +123,7 @@ def test_a_tree_that_no_dataset_has_is_refused_before_it_is_read(hdf5, damage, s
         damage(file["episode_2"])
     tracemalloc.start()
     with pytest.raises(InvalidDemonstrations, match=f"cannot be read .*{says}"):
-        next(read_minari(ID, root=root))
+        next(iter(read_minari(ID, root=root)))
     assert tracemalloc.get_traced_memory()[1] < 20_000_000
     tracemalloc.stop()
 
@@ -143,7 +143,7 @@ def test_files_that_are_links_out_of_the_dataset_are_refused(root):
     (data / name).rename(outside)
     (data / name).symlink_to(outside)
     with pytest.raises(InvalidDemonstrations, match="leads out of the dataset's folder"):
-        next(read_minari(ID, root=root))
+        next(iter(read_minari(ID, root=root)))
 
 
 def test_metadata_that_are_a_link_out_of_the_dataset_are_refused(root):
@@ -159,7 +159,7 @@ def test_a_folder_of_an_episode_that_is_a_link_out_of_the_dataset_is_refused(arr
     folder.rename(root / "outside")
     folder.symlink_to(root / "outside")
     with pytest.raises(InvalidDemonstrations, match="leads out of the dataset's folder"):
-        next(read_minari(ID, root=root))
+        next(iter(read_minari(ID, root=root)))
 
 
 def test_a_dataset_that_is_itself_a_link_of_the_users_is_read(root):
@@ -255,7 +255,7 @@ def test_arrow_whose_places_lead_outside_is_refused(arrow):
     places, outside = (np.array([0, 1, 2, last], dtype=np.int32).tobytes() for last in (3, 10**6))
     (folder / "part-0.arrow").write_bytes((folder / "part-0.arrow").read_bytes().replace(places, outside))
     with pytest.raises(InvalidDemonstrations, match=r"part-0\.arrow is damaged"):
-        next(read_minari(ID, root=root))
+        next(iter(read_minari(ID, root=root)))
 
 
 @pytest.mark.parametrize("packing", ["zstd", "lz4"])
@@ -269,7 +269,7 @@ def test_arrow_that_declares_more_than_it_can_hold_is_refused_before_it_is_unpac
         writer.write_batch(batch)
     monkeypatch.setattr(archives, "FREE", 1 << 10)
     with pytest.raises(InvalidDemonstrations, match="declares 8,000,000: expected at most"):
-        next(read_minari(ID, root=root))
+        next(iter(read_minari(ID, root=root)))
 
 
 def test_packed_arrow_in_proportion_is_no_damage(tmp_path):

@@ -60,13 +60,13 @@ def test_a_dataset_without_an_environment_is_read_with_one_of_its_spaces(spacele
 )
 def test_a_dataset_without_an_environment_is_refused_with_one_of_other_spaces(spaceless, tmp_path, name, says):
     with pytest.raises(DatasetMismatch, match=says):
-        next(read_minari(ID, root=tmp_path, env=gym.make(name)))
+        next(iter(read_minari(ID, root=tmp_path, env=gym.make(name))))
 
 
 def test_other_actions_are_refused(write, tmp_path, lake):
     write(None, observation_space=spaces.Discrete(16), action_space=spaces.Discrete(5))
     with pytest.raises(DatasetMismatch, match=r"actions of Discrete\(5\): expected Discrete\(4\)"):
-        next(read_minari(ID, root=tmp_path, env=lake))
+        next(iter(read_minari(ID, root=tmp_path, env=lake)))
 
 
 def test_a_dataset_of_an_environment_unknown_here_is_read_with_one_of_its_spaces(write, tmp_path, lake):
@@ -77,7 +77,7 @@ def test_a_dataset_of_an_environment_unknown_here_is_read_with_one_of_its_spaces
 def test_a_dataset_of_a_known_environment_is_refused_with_another_of_its_spaces(write, tmp_path, lake):
     recorded_in(write(lake), "CliffWalking-v1")
     with pytest.raises(DatasetMismatch, match=r"recorded in CliffWalking-v1"):
-        next(read_minari(ID, root=tmp_path, env=lake))
+        next(iter(read_minari(ID, root=tmp_path, env=lake)))
 
 
 @pytest.mark.parametrize(

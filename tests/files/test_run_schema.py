@@ -55,6 +55,7 @@ def put(content, to, value):
         ("films/agent.json", "kind", "../x", "its kind is '../x': expected 'webp' or 'png'"),
         (".stages/reward.json", "seconds", "long", "its seconds is 'long': expected a number"),
         (".stages/reward.json", "files", ["../x"], "it is of '../x': expected a file in the folder"),
+        (".stages/reward.json", "files", ["é" * 200], "it is of 'é.*: expected a file in the folder"),
     ],
 )
 def test_an_entry_that_no_run_says_is_named_with_its_file_and_what_was_expected(unvouched, name, entry, value, told):

@@ -16,7 +16,7 @@ from stopped import HANG
 from irl_gym.agents.planners import SB3
 from irl_gym.errors import RunIncomplete
 from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.loop import filming, final_stages
+from irl_gym.loop import filming, final_stages, loop
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.run import read_run
@@ -109,3 +109,9 @@ def test_a_learner_without_what_its_feasible_set_takes_is_not_examined(tmp_path,
     learner = type("Bold", (Dice,), {"of_feasible_set": True, **has})()
     told = final_stages.feasible_set(tmp_path, learner, mdp, np.zeros(7, dtype=int), {"proof": {"terms": {}}})
     assert f"is one of the feasible set, and has no {lacking}," in told["no_ambiguity"]
+
+
+def test_a_run_whose_records_lost_their_digests_goes_on_with_its_agent(unvouched, monkeypatch):
+    monkeypatch.setitem(loop.MAKERS, "figures", ())
+    (unvouched / ".stages" / "agent.json").unlink()
+    assert run(unvouched).metrics["training"]["environment_steps"] >= 2_048

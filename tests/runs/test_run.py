@@ -173,7 +173,7 @@ def test_json_that_is_nested_too_deeply_is_damage(unvouched, name):
 def test_a_run_that_was_killed_is_incomplete_by_its_stage(tmp_path):
     loop = Loop(asked(), tmp_path, command=COMMAND)
     loop.stage("expert")
-    with pytest.raises(RunIncomplete, match=r"the stage 'demonstrations' was not finished.*recover_and_retrain\.py"):
+    with pytest.raises(RunIncomplete, match=r"the stage 'demonstrations' was not finished.*: irl-gym run --env-kwargs"):
         read_run(tmp_path)
 
 

@@ -278,7 +278,7 @@ CASES = [
     ("Use another key.", lambda _: controls_of(lake(), "q=3"), lambda _: controls_of(lake(), "w=3")),
 ]  # fmt: skip
 FILES = [f"{name}.py" for name in (
-    "tabulate tabulation blackjack selfcheck table_files discretize learned_reward linear_reward dynamic_programming "
+    "tables/tabulate tabulation blackjack selfcheck table_files discretize learned_reward linear_reward dynamic_programming "
     "counting step_counts counted_rows tabular_mdp policies sampling shaping rewards rollouts tabular_env tabular_vec_env "
     "rewarded_vec_env bases feature_maps feature_sums generative keyboard published_table published_model "
     "watching_wrappers layouts names space_json"

@@ -279,10 +279,15 @@ CASES = [
 ]  # fmt: skip
 FILES = [f"{one}.py" for one in ("datasets", "minari_files", "minari_formats", "endings", "listed_states", "cells",
                                  "mdp/episodes", "dataset_files", "recorded", "expert_files")]  # fmt: skip
-ELSEWHERE = [    "It comes first, then the policy.", "Give a table's, `table.states`.",  # test_mends_of_the_facade, as the next
+ELSEWHERE = [
+    "It comes first, then the policy.",
+    "Give a table's, `table.states`.",  # test_mends_of_the_facade, as the next
     "Make one of a table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), "
     "table.states)`.",
-"An expert read from a dataset cannot act; give the dataset.", "Write the dataset anew.", "Leave it out."]
+    "An expert read from a dataset cannot act; give the dataset.",
+    "Write the dataset anew.",
+    "Leave it out.",
+]
 """An expert that is given to a run; and what no writer of ours leaves, which is written anew as in other cases."""
 
 

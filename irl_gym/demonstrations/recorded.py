@@ -108,7 +108,7 @@ def _wrapper(name: str, spec: EnvSpec, asked: WrapperSpec, here: EnvSpec) -> Wra
     if module.startswith("irl_gym.") and kind in (known := {one.partition(":")[2]: one for one in OF_IRL_GYM}):
         raise UnknownEnvironment(
             f"dataset {name!r} was recorded in {_shown(spec.id)} with the wrapper {_shown(asked.entry_point)}, of another "
-            f"version of irl_gym: expected {known[kind]}, as it is called here. Name an environment with --env-id."
+            f"version of irl_gym: expected {known[kind]}, as it is called here. Put that in its place in data/metadata.json."
         )
     _refuse(NotTrusted, name, spec, f"with the wrapper {_shown(asked.entry_point)}", "Record it without that wrapper")
 

@@ -62,7 +62,7 @@ def changed(root, **content):
     path.write_text(json.dumps(json.loads(path.read_text()) | content))
 
 
-OLD = {"name": "Reveal", "entry_point": "irl_gym.reveal:Reveal", "kwargs": {"reveal": {}}}
+OLD = {"name": "Reveal", "entry_point": "irl_gym.reveal:Reveal", "kwargs": {"shown": {"s": 16}}}
 """A wrapper as an earlier version named it."""
 
 
@@ -263,9 +263,10 @@ CASES = [
     ("Install or import the package that registers it,", lacks_a_package, installed),
     ("or name an environment with --env-id.",
      lacks_a_package, lambda root: environment_of("FrozenLake-v1", {}, ID, str(root))),
-    ("Name an environment with --env-id.",
+    ("Put that in its place in data/metadata.json.",
      lambda root: recorded_in(root, additional_wrappers=[OLD]) or environment_of(None, {}, ID, str(root)),
-     lambda root: read(root, env=environment_of("FrozenLake-v1", {}, ID, str(root)))),
+     lambda root: recorded_in(root, additional_wrappers=[OLD | {"entry_point": "irl_gym.environments.reveal:Reveal"}])
+     or environment_of(None, {}, ID, str(root))),
     ("Is it another version? Name an environment with --env-id.",
      lambda root: recorded_in(root, kwargs={"colour": 1}) or environment_of(None, {}, ID, str(root)),
      lambda root: environment_of("FrozenLake-v1", {}, ID, str(root))),

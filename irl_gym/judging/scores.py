@@ -109,6 +109,11 @@ def agent_of(policies: Iterable[str]) -> str:
     return next((name for name in (RETRAINED, LEARNED) if name in found), found[0])
 
 
+def who(policies: Iterable[str]) -> str:
+    """What the one that is spoken of is."""
+    return "agent" if agent_of(policies) == RETRAINED else "policy"
+
+
 CALLED = {RETRAINED: "retrained agent", LEARNED: "learner's policy"}
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from irl_gym.facts import Mood
 from irl_gym.intervals import Interval, as_interval
 from irl_gym.judging.metrics import normalised_score
-from irl_gym.judging.scores import BLUR, EXPERT, RANDOM, agent_of, called, others, score_of
+from irl_gym.judging.scores import BLUR, EXPERT, RANDOM, agent_of, called, others, score_of, who
 
 GOOD = 0.9
 """A share from which on an agent is good."""
@@ -34,6 +34,8 @@ MUCH = 0.05
 
 WORDS: Mapping[Mood, str] = {"good": "good", "open": "left open", "bad": "not good", "plain": "not judged"}
 """What each is called; plain is where nothing is judged."""
+WELL: Mapping[Mood, str] = {"good": "Yes", "open": "Perhaps", "bad": "No", "plain": "Not judged"}
+"""Does an agent do as well as the expert, by how it is judged?"""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,11 @@ def judged(policies: Mapping[str, Mapping[str, Any]], table: Mapping[str, Any] |
     score, means = own.get("score"), [returns_of(row) for row in (own, policies[EXPERT], policies[RANDOM])]
     estimated = not (table or {}).get("exact", True)
     return judge(None if score is None else as_interval(score, score, score), *means, estimated=estimated)
+
+
+def as_well(policies: Mapping[str, Mapping[str, Any]]) -> str:
+    """The question that `WELL` answers."""
+    return f"Does the {who(policies)} do as well as the expert?"
 
 
 def judgements(policies: Mapping[str, Mapping[str, Any]], table: Mapping[str, Any] | None) -> str:

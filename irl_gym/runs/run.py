@@ -17,7 +17,7 @@ from irl_gym.features.linear_reward import LinearReward, load_reward
 from irl_gym.files.archives import read_arrays
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, read_json
-from irl_gym.files.run_schema import Config, Diagnosed, EnvironmentFile, Grid, Version, checked
+from irl_gym.files.run_schema import Config, Diagnosed, Grid, Version, checked
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
 from irl_gym.judging.diagnoses.findings import row_of
 from irl_gym.judging.diagnoses.plain_words import with_names
@@ -33,10 +33,10 @@ from irl_gym.runs.reading.belonging import at_odds, left_open, misshapen, strang
 from irl_gym.runs.reading.run_reader import RunReader
 from irl_gym.runs.reading.verified import FILES, Claim, again, claims, recomputed, shares, with_again
 from irl_gym.runs.scorecard import read_metrics, reward_told
+from irl_gym.runs.summary import in_html
 from irl_gym.runs.supply import supplied
 from irl_gym.spaces.listed_states import usual_observation
 from irl_gym.spaces.names import state_name
-from irl_gym.spaces.space_json import told_space
 from irl_gym.tables.layouts import GridLayout
 from irl_gym.tables.table_files import TABLE, load_table
 from irl_gym.tables.tabulation import Tabulation
@@ -128,6 +128,9 @@ class Run(Record):
         among = f", and among it {' and '.join(of)}" if of else ""
         return f"Computed again from its files: {'; '.join(again)}. All else is the run's own record{among}."
 
+    def _repr_html_(self) -> str:
+        return in_html(self.path, self.env_id, self.config, self.metrics, self.whose)
+
     def place_name(self, state: int, action: int | None = None) -> str:
         """A state, or a state and an action, by number, with their names behind where there is a table."""
         return row_of(state, action) if self.table is None else with_names(state, action, self.state_name, self.actions)
@@ -176,7 +179,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
             raise reader.incomplete(f"the stage {name!r} was not finished")
     for record in records.values():
         reader.check(record)
-    env_id, observations, names = _environment(reader)
+    env_id, observations, names = reader.environment()
     if config.get("env_id") not in (None, env_id):
         what = f"{ENVIRONMENT} is of {env_id!r}: expected {config['env_id']!r}, as config.json has"
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
@@ -204,21 +207,6 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
     )  # fmt: skip
     supplied(_check_together, run, reader=reader)
     return replace(run, **supplied(_computed, run, reader=reader))
-
-
-def _environment(reader: RunReader) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    """Id, observation space and names of the actions, which are read: no environment is made on the word of a folder."""
-    if (told := reader.maybe(ENVIRONMENT, _told)) is None:
-        raise reader.incomplete(
-            f"it has no {ENVIRONMENT}, which says what is observed (earlier versions wrote none), and no environment is made "
-            "to read a run; in Python, `irl_gym.runs.identity.write_environment(path, env, env_id)` adds it"
-        )
-    return told
-
-
-def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
-    content = read_json(path, EnvironmentFile)
-    return content["id"], told_space("observations", content["observations"]), tuple(content["actions"])
 
 
 def _table(reader: RunReader, config: Mapping[str, Any], observations: spaces.Space) -> Tabulation:

@@ -1,6 +1,7 @@
 """What only a record says is told as one; what a stranger wrote into it does nothing to who reads it."""
 
 import csv
+import html
 import io
 import shutil
 
@@ -49,23 +50,27 @@ def in_comparison(path, to):
     return (to / "both.html").read_text()
 
 
+def in_notebook(path, to):
+    return read_run(path)._repr_html_()
+
+
 def in_csv(path, to):
     write_metrics_csv(read_metrics(path / "metrics.json"), to / "a.csv", env=None, config=read_json(path / "config.json"))
     with (to / "a.csv").open(newline="") as file:
         return "\n".join(",".join(row) for row in csv.reader(file))
 
 
-@pytest.mark.parametrize("shown", [in_terminal, on_page, in_comparison, in_csv])
+@pytest.mark.parametrize("shown", [in_terminal, on_page, in_comparison, in_csv, in_notebook])
 def test_names_of_a_stranger_s_policies_are_spelled_out(strange, tmp_path, shown):
     said = shown(strange, tmp_path)
-    assert SPELLED[0] in said and (SPELLED[1] in said or shown is in_csv)
+    assert SPELLED[0] in said and (SPELLED[1] in said or shown in (in_csv, in_notebook))
     assert not any(one in said for one in ("\x1b", "\u202e", "\r"))
 
 
-@pytest.mark.parametrize("shown", [in_terminal, on_page, in_comparison])
+@pytest.mark.parametrize("shown", [in_terminal, on_page, in_comparison, in_notebook])
 def test_what_a_stranger_says_of_policies_is_told_as_a_record(strange, tmp_path, shown):
     said = shown(strange, tmp_path)
-    assert "All else is the run's own record, and among it" in said.replace("&#39;", "'") and "what is said of theirs" in said
+    assert "All else is the run's own record, and among it" in html.unescape(said) and "what is said of theirs" in said
 
 
 def test_of_a_run_without_a_table_that_is_shown_again_all_is_told_as_a_record(policy_run, tmp_path):

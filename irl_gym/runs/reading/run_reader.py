@@ -4,9 +4,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gymnasium import spaces
+
 from irl_gym.errors import DamagedFile, IrlGymError, RunIncomplete
-from irl_gym.files.run_folder import NOT_THE_SAME, STAGE_RECORDS, changed, checked_record
-from irl_gym.runs.identity import NEW_FOLDER, into_folder, ours, shell_command
+from irl_gym.files.run_folder import NOT_THE_SAME, STAGE_RECORDS, changed, checked_record, read_json
+from irl_gym.files.run_schema import EnvironmentFile
+from irl_gym.runs.identity import ENVIRONMENT, NEW_FOLDER, into_folder, ours, shell_command
+from irl_gym.spaces.space_json import told_space
 
 ONCE = ("config.json", "run.json")
 """Files that no stage writes: they are there from the start."""
@@ -70,3 +74,17 @@ class RunReader:
         if name is not None:
             told = f"{name} {NOT_THE_SAME}"
             raise self.lost(told) if name in ONCE else self.incomplete(f"{told}; delete it, and it is made again")
+
+    def environment(self) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
+        """Id, observation space and names of the actions, which are read: no environment is made on the word of a folder."""
+        if (told := self.maybe(ENVIRONMENT, _told)) is None:
+            raise self.incomplete(
+                f"it has no {ENVIRONMENT}, which says what is observed (earlier versions wrote none), and no environment is "
+                "made to read a run; in Python, `irl_gym.runs.identity.write_environment(path, env, env_id)` adds it"
+            )
+        return told
+
+
+def _told(path: Path) -> tuple[str | None, spaces.Space, tuple[str, ...]]:
+    content = read_json(path, EnvironmentFile)
+    return content["id"], told_space("observations", content["observations"]), tuple(content["actions"])

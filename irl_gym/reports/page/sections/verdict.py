@@ -9,18 +9,17 @@ from typing import Any, NamedTuple
 
 from irl_gym.facts import Mood
 from irl_gym.intervals import TOO_FEW, Interval
+from irl_gym.judging import scores
 from irl_gym.judging.confirmation import loss_told
 from irl_gym.judging.measures import no_score
 from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, others, score_of, the
-from irl_gym.judging.shares import GOOD, MUCH, judged, returns_of
+from irl_gym.judging.shares import GOOD, MUCH, WELL, as_well, judged, returns_of
 from irl_gym.mdp.sampling_error import estimated_table
 from irl_gym.reports.page.sections.judged import answer, how
 from irl_gym.reports.page.sections.proof import whence
 from irl_gym.runs.certificates import facts_in
 from irl_gym.written import counted, number, percent
 
-WELL: Mapping[Mood, str] = {"good": "Yes", "open": "Perhaps", "bad": "No", "plain": "Not judged"}
-"""Does it do as well as the expert, by how it is judged?"""
 ROUNDED = 1e-9
 """A share that is no more than rounding."""
 
@@ -50,11 +49,11 @@ def verdict(
         whose: whose word it is, what is said of the run.
     """
     agent, reward = _agent(metrics), metrics["reward"]
-    who = "agent" if agent_of(metrics["policies"]) == RETRAINED else "policy"
+    who = scores.who(metrics["policies"])
     trusted = _trusted(metrics, certificate, diagnosis, recomputed) if rewarded else _policy_trusted(certificate)
     questions = [
         {
-            "question": f"Does the {who} do as well as the expert?",
+            "question": as_well(metrics["policies"]),
             **_well(metrics)._asdict(),
             "figures": _earned(metrics, agent, who),
         },

@@ -75,3 +75,10 @@ def test_a_file_becomes_a_dataset(irl_gym, here):
     assert done.code == 0 and done.out.startswith("me/log-v0: 2 episodes, 3 steps, "), done.errors
     found = [*read_minari("me/log-v0", root=here)]
     assert [one.actions.tolist() for one in found] == [[1, 1], [2]] and np.array_equal(found[0].observations[:2], [0, 4])
+
+
+def test_one_of_a_kind_is_told_in_the_singular(irl_gym, here):
+    (here / "log.csv").write_text("episode,step,cell,action\na,0,0,1\n")
+    asked = ("--csv", "log.csv", "--observation-columns", "cell", "--dataset-id", "me/log-v0", "--root", ".")
+    done = irl_gym("export", "--env-id", "FrozenLake-v1", *asked)
+    assert done.code == 0 and done.out.startswith("me/log-v0: 1 episode, 1 step, "), done.errors

@@ -1,13 +1,13 @@
 """What all subcommands do in a terminal in the same way: read arguments, say how far a stage is, and what went wrong."""
 
 import contextlib
-import difflib
 import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Literal, Protocol, TypeVar, get_args, get_origin, get_type_hints, runtime_checkable
 
 import tyro
 from rich.console import Console
@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 from tyro.conf import DisallowNone, OmitArgPrefixes, arg
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, did_you_mean
 from irl_gym.facts import harmless
 
 UNSET = arg(help_behavior_hint="")
@@ -27,7 +27,7 @@ Options = TypeVar("Options")
 
 
 def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, about: str | None) -> Options:
-    """The arguments of a subcommand, as a record; --help and what cannot be read end the process, as tyro has it.
+    """The arguments of a subcommand, as a record; --help and what cannot be read end the process.
 
     Args:
         kind: a dataclass, whose fields are the options.
@@ -35,7 +35,30 @@ def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, a
         subcommand: its name.
         about: what --help says first.
     """
+    try:
+        if not {"-h", "--help"} & {*words}:
+            _check_choices(kind, words)
+    except InvalidParameter as error:
+        print_error(error)
+        raise SystemExit(2) from error
     return tyro.cli(kind, args=named_first(kind, words), prog=f"irl-gym {subcommand}", description=about, config=OPTIONS)
+
+
+def _check_choices(kind: type, words: Sequence[str]) -> None:
+    """Check the words behind options that take one of a few.
+
+    Raises:
+        InvalidParameter: another one; the closest is offered, which tyro does not do.
+    """
+    given = [*pairwise(words), *((flag, value) for flag, equals, value in (one.partition("=") for one in words) if equals)]
+    for name, hint in get_type_hints(kind).items():
+        if is_dataclass(hint):
+            _check_choices(hint, words)
+        kinds = [one for one in ([hint] if get_origin(hint) is Literal else get_args(hint)) if one is not type(None)]
+        if kinds and all(get_origin(one) is Literal for one in kinds):
+            for flag, value in given:
+                if flag.replace("_", "-") == f"--{name.replace('_', '-')}" and not value.startswith("-"):
+                    checked_name(flag, value, [choice for one in kinds for choice in get_args(one)])
 
 
 FIRST = ("env_id", "run", "environment")
@@ -63,9 +86,7 @@ def checked_name(what: str, name: str, known: Collection[str]) -> str:
         InvalidParameter: another one; the closest is offered.
     """
     if name not in known:
-        close = difflib.get_close_matches(name, known, 1, 0.5)
-        offer = f" Did you mean {close[0]!r}?" if close else ""
-        raise InvalidParameter(f"{what} is {name!r}: expected one of {', '.join(known)}.{offer}")
+        raise InvalidParameter(f"{what} is {name!r}: expected one of {', '.join(known)}.{did_you_mean(name, known)}")
     return name
 
 

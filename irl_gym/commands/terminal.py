@@ -1,6 +1,7 @@
 """What all subcommands do in a terminal in the same way: read arguments, say how far a stage is, and what went wrong."""
 
 import contextlib
+import sysconfig
 import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -215,14 +216,18 @@ def print_error(error: Exception) -> None:
 
 
 DEFECT = 70
-"""What a script exits with that stumbled over a defect of irl_gym: EX_SOFTWARE, as sysexits.h has it."""
+"""What a script exits with that stumbled over a defect, of irl_gym or of code of the user's own: EX_SOFTWARE of sysexits.h."""
+OURS = ("irl_gym", "irl_gym_envs")
+"""Packages whose code is no user's own."""
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders of code that is none either."""
 
 
 def exit_code(script: Callable[[], int], others: str = "") -> int:
     """What a script exits with.
 
     Whatever is wrong with a user's arguments and files has an error of its own, which scripts print. Any other is a defect of
-    irl_gym, and is called one, with what is needed to report it.
+    irl_gym, and is called one, with what is needed to report it; unless code of the user's own raised it, which is named.
 
     Args:
         script: tells what it exits with.
@@ -231,8 +236,25 @@ def exit_code(script: Callable[[], int], others: str = "") -> int:
     try:
         return script()
     except Exception as error:
+        what, where = f"{type(error).__name__}: {error}", _own_place(error)
         whose = f"irl_gym or of {others}" if others else "irl_gym"
-        told = f"This is a defect of {whose}, not of your files: {type(error).__name__}: {error}"
-        said = f"{told}. Please report it with this traceback:\n{''.join(traceback.format_exception(error))}"
+        told = f"This is a defect of {whose}, not of your files: {what}. Please report it with this traceback"
+        if where is not None:
+            told = f"Code that is not irl_gym's raised an error, {where}: {what}. Its traceback"
+        said = f"{told}:\n{''.join(traceback.format_exception(error))}"
         Console(stderr=True, soft_wrap=True).print(Text(harmless(said)))
         return DEFECT
+
+
+def _own_place(error: Exception) -> str | None:
+    """Where code of the user's own raised an error, itself or in what it called of installed packages; None for irl_gym's."""
+    if isinstance(error, SyntaxError) and Path(error.filename or "").is_file():
+        return f"{error.filename}, line {error.lineno}"
+    for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]):
+        file = frame.f_code.co_filename
+        if frame.f_globals.get("__name__", "").split(".")[0] in OURS:
+            return None
+        installed = file.startswith(("<", sysconfig.get_path("stdlib"))) or {*INSTALLED} & {*Path(file).parts}
+        if not installed:
+            return f"{file}, line {line}, in {frame.f_code.co_name}"
+    return None

@@ -185,3 +185,16 @@ def test_an_installed_module_comes_before_one_of_that_name_where_the_user_stands
 def test_python_that_is_asked_to_trust_no_folder_trusts_none(here):
     told = process("-P", "-m", "irl_gym", "run", "--learner", "own_learner_here:Twin", cwd=here).stderr
     assert "no module 'own_learner_here', which was looked for among what is installed" in told
+
+
+def test_an_error_in_a_learner_of_the_users_own_is_told_as_theirs(irl_gym, here):
+    done = irl_gym("run", "--env-id", "own_env_here:Pond-v0", "--learner", "own_learner_here:Broken", *FEW, "--out", "run")
+    told = f"Code that is not irl_gym's raised an error, {here / 'own_learner_here.py'}, line 23, in learn: IndexError: "
+    assert done.code == 70 and done.errors.startswith(told), done.errors
+
+
+def test_an_own_module_that_python_cannot_read_is_told_as_theirs(irl_gym, here):
+    (here / "own_learner_here.py").write_text("class Twin\n")
+    done = irl_gym("learners", "own_learner_here:Twin")
+    told = f"Code that is not irl_gym's raised an error, {here / 'own_learner_here.py'}, line 1: SyntaxError: "
+    assert done.code == 70 and done.errors.startswith(told), done.errors

@@ -43,7 +43,7 @@ def learner_class(name: str) -> type[Any]:
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # of something that the user's module imports
-        raise UnknownLearner(f"learner is {name!r}, and {no_module(error.name)}") from error
+        raise UnknownLearner(f"learner is {name!r}, and {no_module(error.name, attribute)}") from error
     except AttributeError as error:
         raise UnknownLearner(f"learner is {name!r}, and {module} has no {attribute!r}: expected a class of it.") from error
     usable = isinstance(getattr(found, "needs", None), Needs) and callable(getattr(found, "learn", None))

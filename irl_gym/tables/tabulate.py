@@ -154,8 +154,9 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         raise InvalidParameter(f"{env_id} cannot be made with {kwargs}: {type(error).__name__}: {error}.") from error
     except (gym.error.Error, ModuleNotFoundError) as error:
         module, _, name = env_id.rpartition(":")
-        if module and isinstance(error, ModuleNotFoundError) and f"'{module}'" in str(error):
-            raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(module)}") from error
+        missing = getattr(error.__cause__, "name", None)
+        if module and missing and f"{module}.".startswith(f"{missing}."):  # else it is of something that the module imports
+            raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(missing, name)}") from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
             raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
         known = {one: f"{module}:{one}" if _made_by(module, one) else one for one in gym.registry if one not in NO_WORLDS}

@@ -198,3 +198,10 @@ def test_an_own_module_that_python_cannot_read_is_told_as_theirs(irl_gym, here):
     done = irl_gym("learners", "own_learner_here:Twin")
     told = f"Code that is not irl_gym's raised an error, {here / 'own_learner_here.py'}, line 1: SyntaxError: "
     assert done.code == 70 and done.errors.startswith(told), done.errors
+
+
+def test_what_an_own_module_imports_and_python_does_not_find_is_named(irl_gym, here):
+    (here / "own_env_here.py").write_text("import nowhere_to_be_found\n")
+    done = irl_gym("tabulate", "own_env_here:Pond-v0")
+    assert done.code == 2 and "No module named 'nowhere_to_be_found'" in done.errors
+    assert "there is no module 'own_env_here'" not in done.errors

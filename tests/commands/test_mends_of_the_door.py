@@ -1,5 +1,7 @@
 """The mends that `irl-gym` names where it reads its arguments are executed."""
 
+import shutil
+
 import pytest
 
 LOG = "episode,step,cell,action\na,0,0,1\na,1,2,2\n"
@@ -21,6 +23,8 @@ CASES = [
     ("Leave the other out.", ("run", "--seed", "1", "--seeds", "0,1"), ("learners",)),
     ("Run irl-gym in the folder that has it, or install it.", ("learners", "nowhere_to_be_found:Twin"),
      ("learners", "own_learner_here:Twin")),
+    ("Write own_learner_here:Twin.", ("learners", "own_learner_here.py:Twin"), ("learners", "own_learner_here:Twin")),
+    ("Write own_env_here:Pond-v0.", ("tabulate", "own_env_here.py:Pond-v0"), ("tabulate", "own_env_here:Pond-v0")),
     ("Did you mean 'doctor'?", ("doktor",), ("doctor", "--help")),
     ("Did you mean 'ppo'?", ("run", "--retrain", "ppoo"), ("run", "--retrain", "ppo", "--help")),
     ("Did you mean 'value-iteration'?", ("run", *POND, "--retrain=value_iteration"),
@@ -47,3 +51,11 @@ def test_a_mend_that_the_command_line_names_serves(irl_gym, here, says, breaks, 
     assert done.code == 2 and says in done.errors
     done = irl_gym(*mended)
     assert done.code == 0, done.errors
+
+
+def test_a_run_that_is_named_twice_is_refused_and_another_one_in_its_place_serves(irl_gym, here, finished):
+    for name in ("a", "b"):
+        shutil.copytree(finished, here / name)
+    done = irl_gym("compare", "a", "./a")
+    assert done.code == 2 and "a twice: expected different folders. Put another run in its place." in done.errors
+    assert irl_gym("compare", "a", "b").code == 0

@@ -53,7 +53,7 @@ def _check_choices(kind: type, words: Sequence[str]) -> None:
     """
     given = [*pairwise(words), *((flag, value) for flag, equals, value in (one.partition("=") for one in words) if equals)]
     for name, hint in get_type_hints(kind).items():
-        if is_dataclass(hint):
+        if isinstance(hint, type) and is_dataclass(hint):
             _check_choices(hint, words)
         kinds = [one for one in ([hint] if get_origin(hint) is Literal else get_args(hint)) if one is not type(None)]
         if kinds and all(get_origin(one) is Literal for one in kinds):

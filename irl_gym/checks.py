@@ -229,8 +229,15 @@ def shown_sum(total: float) -> str:
     return told if told != "1" else f"1 {'+' if total > 1 else '-'} {abs(total - 1):.1g}"
 
 
-def no_module(name: str) -> str:
-    """What is said of a module that Python does not find: where it was looked for, and what to do."""
+def no_module(name: str, attribute: str) -> str:
+    """What is said of a module that Python does not find: where it was looked for, and what to do.
+
+    Args:
+        name: its name.
+        attribute: what was asked for in it, behind a colon.
+    """
+    if name.endswith(".py"):
+        return f"{name} is a file: expected a module's name. Write {name.removesuffix('.py')}:{attribute}."
     here = os.getcwd()
     places = f"in {here} and among what is installed" if {"", here} & {*sys.path} else "among what is installed"
     return (

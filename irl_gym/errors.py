@@ -43,6 +43,9 @@ IrlGymError
 A message reads `what, with the value: what was expected. The mend.`
 """
 
+from collections.abc import Collection
+from difflib import get_close_matches
+
 
 class IrlGymError(Exception):
     """Base class: `except IrlGymError` catches everything this library raises on purpose."""
@@ -198,3 +201,9 @@ class RunIncomplete(UnreadableRun):
 
 class RunNewer(UnreadableRun):
     """A run folder that a newer version wrote."""
+
+
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """What an error ends with that a mistyped name caused: the closest one as a question; nothing where none is close."""
+    close = get_close_matches(name, known, 1, 0.5)
+    return f" Did you mean {close[0]!r}?" if close else ""

@@ -14,7 +14,7 @@ from irl_gym.commands.csv_columns import Log
 from irl_gym.commands.learning_arguments import Learning
 from irl_gym.commands.terminal import UNSET
 from irl_gym.demonstrations.choices import AfterEnd
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, did_you_mean
 from irl_gym.runs.choices import KNOWN, TAKEN, PlannerName, Reveals
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Demonstrations:
             return self.expert
         raise InvalidParameter(
             f"expert is {self.expert!r}: expected one of {', '.join(get_args(PlannerName))}, or a file, SB3's zip of an agent "
-            "or an npz of actions."
+            f"or an npz of actions.{did_you_mean(self.expert, get_args(PlannerName))}"
         )
 
 

@@ -4,6 +4,7 @@ For example:
     irl-gym compare runs/a runs/b runs/c --out compare.html
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,9 @@ def main(arguments: Arguments) -> int:
     try:
         if len(arguments.runs) == 1:
             raise InvalidParameter(f"runs has 1 folder, {arguments.runs[0]}: expected two or more to put side by side.")
+        twice = next((one for one, n in Counter(map(Path.resolve, arguments.runs)).items() if n > 1), None)
+        if twice is not None:
+            raise InvalidParameter(f"runs has {twice} twice: expected different folders. Put another run in its place.")
         check_writable(arguments.out)
         side_by_side(arguments.runs, arguments.out)
     except (IrlGymError, OSError) as error:

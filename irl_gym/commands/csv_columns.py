@@ -3,13 +3,14 @@
 import hashlib
 import json
 import re
+import shlex
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from irl_gym.commands.terminal import UNSET
 from irl_gym.demonstrations.choices import Last
-from irl_gym.errors import DatasetMissing, InvalidDemonstrations
+from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -18,10 +19,11 @@ if TYPE_CHECKING:
 
 NONE = "none"
 """What names no column."""
-FLAGS = (
-    "(On the command line: --episode-column, --step-column, --observation-columns, --action-column, --reward-column, "
-    "--terminated-column, --truncated-column, --next-observation-columns, each with a name or none.)"
+ARGUMENT = re.compile(
+    r"\b(?:(?P<one>episode|step|action|reward|terminated|truncated)|(?P<several>(?:next_)?observation)(?: (?P<place>\d+))?"
+    r"|(?P<last>last))=(?P<value>None|\.\.\.|'[^']*'|\"[^\"]*\")"
 )
+"""An argument of `from_frame`, in the mend of an error."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,17 @@ class Log:
         seen = _columns(self.observation_columns)
         try:
             return from_frame(self.csv, observation=seen, next_observation=following, last=self.last, env=env, **columns)
-        except InvalidDemonstrations as error:
-            raise InvalidDemonstrations(f"{error} {FLAGS}" if "column" in str(error) else str(error)) from error
+        except (InvalidDemonstrations, InvalidParameter) as error:
+            raise type(error)(ARGUMENT.sub(self._option, str(error))) from error
+
+    def _option(self, argument: re.Match[str]) -> str:
+        """The option that stands for an argument on the command line; of several columns all are named."""
+        value = {"None": NONE, "...": "NAME"}.get(argument["value"], argument["value"].strip("'\""))
+        if argument["several"] is None:
+            return f"--{argument['last'] or argument['one'] + '-column'} {shlex.quote(value)}"
+        names = [*getattr(self, f"{argument['several']}_columns")]
+        names[int(argument["place"] or 0)] = value
+        return f"--{argument['several'].replace('_', '-')}-columns {shlex.join(names)}"
 
     def write(self, episodes: "list[Episode]", env: "gym.Env", dataset_id: str, root: Path | None, **how: Any) -> Any:
         """Write episodes of the file as a Minari dataset, which says what they were read from; `how` is for `write_minari`.

@@ -20,6 +20,7 @@ from irl_gym.commands.arguments import parse_reveal
 from irl_gym.commands.csv_columns import Log
 from irl_gym.commands.terminal import UNSET, exit_code, print_error, read_arguments, stage_bars
 from irl_gym.errors import InvalidParameter, IrlGymError
+from irl_gym.facts import counted
 
 OF_EXPERT = (
     "max_states", "expert", "expert_normalize", "epsilon", "episodes", "steps", "max_episode_steps", "total_timesteps", "gamma",
@@ -101,9 +102,8 @@ def main(arguments: Arguments) -> int:
         print_error(error)
         return 2
     size = dataset.storage.metadata["dataset_size"]
-    console.print(
-        f"{dataset.id}: {dataset.total_episodes:,} episodes, {dataset.total_steps:,} steps, {size:,.1f} MB, at", end=" "
-    )
+    held = f"{counted(dataset.total_episodes, 'episode')}, {counted(dataset.total_steps, 'step')}"
+    console.print(f"{dataset.id}: {held}, {size:,.1f} MB, at", end=" ")
     console.print(Text(str(Path(dataset.storage.data_path).parent)))
     if lost:
         console.print(Text(f"{lost} Who learns from it names one with --env-id."))

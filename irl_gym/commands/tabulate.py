@@ -16,7 +16,7 @@ from rich.text import Text
 from irl_gym.commands.arguments import Environment, Table, parse_reveal
 from irl_gym.commands.terminal import check_writable, exit_code, print_error, read_arguments, stage_bars
 from irl_gym.errors import IrlGymError
-from irl_gym.facts import harmless
+from irl_gym.facts import counted, harmless
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -115,7 +115,7 @@ def summary(env: "gym.Env", table: "Tabulation") -> Iterator[str]:
     yield from evidence
     hidden = shown_by(env)
     if hidden:
-        told = ", ".join(f"{name} ({n} values)" for name, n in hidden.items())
+        told = ", ".join(f"{name} ({counted(n, 'value')})" for name, n in hidden.items())
         yield f"hidden, and shown here   {told}"
     elif table.evidence.repeats is None:
         none = "none found: no step contradicts the table, which does not exclude it"

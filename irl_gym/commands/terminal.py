@@ -1,13 +1,14 @@
 """What all subcommands do in a terminal in the same way: read arguments, say how far a stage is, and what went wrong."""
 
 import contextlib
-import difflib
+import sysconfig
 import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Literal, Protocol, TypeVar, get_args, get_origin, get_type_hints, runtime_checkable
 
 import tyro
 from rich.console import Console
@@ -16,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 from tyro.conf import DisallowNone, OmitArgPrefixes, arg
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, did_you_mean
 from irl_gym.facts import harmless
 
 UNSET = arg(help_behavior_hint="")
@@ -27,7 +28,7 @@ Options = TypeVar("Options")
 
 
 def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, about: str | None) -> Options:
-    """The arguments of a subcommand, as a record; --help and what cannot be read end the process, as tyro has it.
+    """The arguments of a subcommand, as a record; --help and what cannot be read end the process.
 
     Args:
         kind: a dataclass, whose fields are the options.
@@ -35,7 +36,30 @@ def read_arguments(kind: type[Options], words: Sequence[str], subcommand: str, a
         subcommand: its name.
         about: what --help says first.
     """
+    try:
+        if not {"-h", "--help"} & {*words}:
+            _check_choices(kind, words)
+    except InvalidParameter as error:
+        print_error(error)
+        raise SystemExit(2) from error
     return tyro.cli(kind, args=named_first(kind, words), prog=f"irl-gym {subcommand}", description=about, config=OPTIONS)
+
+
+def _check_choices(kind: type, words: Sequence[str]) -> None:
+    """Check the words behind options that take one of a few.
+
+    Raises:
+        InvalidParameter: another one; the closest is offered, which tyro does not do.
+    """
+    given = [*pairwise(words), *((flag, value) for flag, equals, value in (one.partition("=") for one in words) if equals)]
+    for name, hint in get_type_hints(kind).items():
+        if isinstance(hint, type) and is_dataclass(hint):
+            _check_choices(hint, words)
+        kinds = [one for one in ([hint] if get_origin(hint) is Literal else get_args(hint)) if one is not type(None)]
+        if kinds and all(get_origin(one) is Literal for one in kinds):
+            for flag, value in given:
+                if flag.replace("_", "-") == f"--{name.replace('_', '-')}" and not value.startswith("-"):
+                    checked_name(flag, value, [choice for one in kinds for choice in get_args(one)])
 
 
 FIRST = ("env_id", "run", "environment")
@@ -63,9 +87,7 @@ def checked_name(what: str, name: str, known: Collection[str]) -> str:
         InvalidParameter: another one; the closest is offered.
     """
     if name not in known:
-        close = difflib.get_close_matches(name, known, 1, 0.5)
-        offer = f" Did you mean {close[0]!r}?" if close else ""
-        raise InvalidParameter(f"{what} is {name!r}: expected one of {', '.join(known)}.{offer}")
+        raise InvalidParameter(f"{what} is {name!r}: expected one of {', '.join(known)}.{did_you_mean(name, known)}")
     return name
 
 
@@ -194,14 +216,18 @@ def print_error(error: Exception) -> None:
 
 
 DEFECT = 70
-"""What a script exits with that stumbled over a defect of irl_gym: EX_SOFTWARE, as sysexits.h has it."""
+"""What a script exits with that stumbled over a defect, of irl_gym or of code of the user's own: EX_SOFTWARE of sysexits.h."""
+OURS = ("irl_gym", "irl_gym_envs")
+"""Packages whose code is no user's own."""
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders of code that is none either."""
 
 
 def exit_code(script: Callable[[], int], others: str = "") -> int:
     """What a script exits with.
 
     Whatever is wrong with a user's arguments and files has an error of its own, which scripts print. Any other is a defect of
-    irl_gym, and is called one, with what is needed to report it.
+    irl_gym, and is called one, with what is needed to report it; unless code of the user's own raised it, which is named.
 
     Args:
         script: tells what it exits with.
@@ -210,8 +236,25 @@ def exit_code(script: Callable[[], int], others: str = "") -> int:
     try:
         return script()
     except Exception as error:
+        what, where = f"{type(error).__name__}: {error}", _own_place(error)
         whose = f"irl_gym or of {others}" if others else "irl_gym"
-        told = f"This is a defect of {whose}, not of your files: {type(error).__name__}: {error}"
-        said = f"{told}. Please report it with this traceback:\n{''.join(traceback.format_exception(error))}"
+        told = f"This is a defect of {whose}, not of your files: {what}. Please report it with this traceback"
+        if where is not None:
+            told = f"Code that is not irl_gym's raised an error, {where}: {what}. Its traceback"
+        said = f"{told}:\n{''.join(traceback.format_exception(error))}"
         Console(stderr=True, soft_wrap=True).print(Text(harmless(said)))
         return DEFECT
+
+
+def _own_place(error: Exception) -> str | None:
+    """Where code of the user's own raised an error, itself or in what it called of installed packages; None for irl_gym's."""
+    if isinstance(error, SyntaxError) and Path(error.filename or "").is_file():
+        return f"{error.filename}, line {error.lineno}"
+    for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]):
+        file = frame.f_code.co_filename
+        if frame.f_globals.get("__name__", "").split(".")[0] in OURS:
+            return None
+        installed = file.startswith(("<", sysconfig.get_path("stdlib"))) or {*INSTALLED} & {*Path(file).parts}
+        if not installed:
+            return f"{file}, line {line}, in {frame.f_code.co_name}"
+    return None

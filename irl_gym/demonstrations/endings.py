@@ -24,14 +24,14 @@ from irl_gym.mdp.tabular_mdp import TransitionTable
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
 
-LOST: dict[str, str] = {
-    "dropped": "episodes whose last action was dropped when they were imported, with what it paid",
-    "unseen": "episodes that do not say what their last action led to",
-    "followed": "episodes that do not say what their last action led to, which the table knows",
-    "steps_cut": "steps cut off after an end",
-    "episodes_cut": "episodes left out that begin in an end",
+LOST: dict[str, tuple[str, str]] = {
+    "dropped": ("episode", "whose last action was dropped in the import, with what it paid"),
+    "unseen": ("episode", "without word of what the last action led to"),
+    "followed": ("episode", "without word of what the last action led to, which the table knows"),
+    "steps_cut": ("step", "cut off after an end"),
+    "episodes_cut": ("episode", "left out for beginning in an end"),
 }
-"""What may be missing from a dataset, and what a report calls it."""
+"""What may be missing from a dataset, and what a report calls it, behind its count: a noun, and what is the matter."""
 MEND = "Pass after_end='cut' (--after-end cut)"
 
 

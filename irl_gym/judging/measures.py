@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym import facts
 from irl_gym._typing import ActionSets
 from irl_gym.errors import UndefinedDistance
 from irl_gym.intervals import Interval, as_interval
@@ -184,7 +185,7 @@ def _value_told(metrics: Mapping[str, Any]) -> str:
     told, table = metrics["demonstrations"], metrics["table"]
     if table is None:
         return "discounted, from the start, mean of episodes"
-    cut = f", cut after {table['horizon']} steps" if table.get("horizon") is not None else ""
+    cut = f", cut after {facts.counted(table['horizon'], 'step')}" if table.get("horizon") is not None else ""
     given = ", the expert's that of its episodes, paid by the table" if told["given"] else ""
     where = "exact" if table.get("exact", True) else "computed on a table that is an estimate"
     return f"{where}, discounted, from the start{cut}{given}"

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import t
 
 from irl_gym._typing import Vector
+from irl_gym.facts import counted
 from irl_gym.intervals import LEVEL
 from irl_gym.judging.metrics import normalised_score
 
@@ -60,8 +61,8 @@ class Scale:
         if self.few:
             known = "" if np.isinf(self.half) else f", give or take {self.half:.2g}"
             return (
-                f"the expert's value, {self.expert:.4g}{known}, is the mean of {_episodes(self.episodes)}, too few to set it "
-                f"apart from random actions, {self.random:.4g}"
+                f"the expert's value, {self.expert:.4g}{known}, is the mean of {counted(self.episodes or 0, 'episode')}, too "
+                f"few to set it apart from random actions, {self.random:.4g}"
             )
         if self.rounding and abs(self.expert - self.random) <= self.rounding:
             return (
@@ -146,7 +147,3 @@ def half_width(returns: Vector, exact: bool) -> float:
     if returns.size < FEWEST:
         return float("inf")
     return float(t.ppf((1 + LEVEL) / 2, returns.size - 1) * returns.std(ddof=1) / np.sqrt(returns.size))
-
-
-def _episodes(count: int | None) -> str:
-    return "1 episode" if count == 1 else f"{count:,} episodes"

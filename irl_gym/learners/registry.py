@@ -1,12 +1,11 @@
 """Learners by name: those that are built in, and a user's own as `module:Class`."""
 
-import difflib
 import importlib
 import inspect
 from typing import Any
 
 from irl_gym.checks import no_module
-from irl_gym.errors import InvalidParameter, UnknownLearner
+from irl_gym.errors import InvalidParameter, UnknownLearner, did_you_mean
 from irl_gym.learners.needs import Needs
 
 BUILT_IN = {
@@ -33,9 +32,10 @@ def learner_class(name: str) -> type[Any]:
     where = BUILT_IN.get(name, name)
     module, colon, attribute = where.partition(":")
     if not colon:
-        close = difflib.get_close_matches(name, BUILT_IN, 1)
-        offer = f" Did you mean {close[0]!r}?" if close else ""
-        raise UnknownLearner(f"learner is {name!r}: expected one of {', '.join(BUILT_IN)}, or module:Class of your own.{offer}")
+        raise UnknownLearner(
+            f"learner is {name!r}: expected one of {', '.join(BUILT_IN)}, or module:Class of your own."
+            f"{did_you_mean(name, BUILT_IN)}"
+        )
     if not all(part.isidentifier() for part in module.split(".")):
         raise UnknownLearner(f"learner is {name!r}: expected a module and a class, such as my_module:MyLearner.")
     try:
@@ -43,7 +43,7 @@ def learner_class(name: str) -> type[Any]:
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise  # of something that the user's module imports
-        raise UnknownLearner(f"learner is {name!r}, and {no_module(error.name)}") from error
+        raise UnknownLearner(f"learner is {name!r}, and {no_module(error.name, attribute)}") from error
     except AttributeError as error:
         raise UnknownLearner(f"learner is {name!r}, and {module} has no {attribute!r}: expected a class of it.") from error
     usable = isinstance(getattr(found, "needs", None), Needs) and callable(getattr(found, "learn", None))

@@ -29,6 +29,7 @@ from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.errors import InvalidParameter
+from irl_gym.facts import counted
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.files.run_folder import RunFolder
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
@@ -139,7 +140,7 @@ class Loop:
         self.world.keep_table(path)
         record_start(path, table_kept=table_kept)
         states = self.world.states
-        self._told("table", 1.0, "none, as it is stepped" if states is None else f"{states.n_states:,} states")
+        self._told("table", 1.0, "none, as it is stepped" if states is None else counted(states.n_states))
 
     def stage(self, name: str) -> dict[str, Any]:
         """Run one stage, or read its record if it was finished before."""

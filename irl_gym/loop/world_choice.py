@@ -105,7 +105,7 @@ def _instead(error: NotTabular | NotDiscrete, env: gym.Env, asked: Experiment) -
         ways.append("Or count what random steps do (--table sample).")
     elif kind is NotDiscrete and isinstance(space, spaces.Box) and space.dtype.kind == "f":
         each = max(2, int(CELLS ** (1 / max(1, len(_coordinates(env))))))
-        ways.append(f"Or make a table of cells, if its state can be set: `{command} --bins {each}`.")
+        ways.append(f"Or make a table of cells, if its state can be set: `{command} --bins {each} --retrain value-iteration`.")
     if kind is not EnvironmentFailed and isinstance(space, spaces.Box | spaces.Discrete | spaces.MultiDiscrete):
         ways.append(f"Or learn from episodes alone, with TrajectoryLP: `{command} --learner trajectory-lp`.")
     return "".join(f" {way}" for way in ways)

@@ -239,7 +239,9 @@ def check_reward_itself(reward: Any) -> None:
         InvalidReward: it is.
     """
     if hasattr(reward, "reward"):
-        raise InvalidReward(f"the reward is a {type(reward).__name__}: expected the reward that it holds. Give its `reward`.")
+        raise InvalidReward(
+            f"the reward is of type {type(reward).__name__}: expected the reward that it holds. Give its `reward`."
+        )
 
 
 def plain_json(value: Any) -> Any:

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from irl_gym.demonstrations.endings import LOST
-from irl_gym.facts import Fact, harmless
+from irl_gym.facts import Fact, counted, harmless
 from irl_gym.files.run_folder import read_json
 from irl_gym.files.run_schema import Diagnosed, EnvironmentFile
 from irl_gym.judging import measures
@@ -81,16 +81,16 @@ def _asked(config: Mapping[str, Any], hidden: Mapping[str, int], out: Path) -> s
     if config["start_seeds"]:
         told.append(f"layouts from the seeds {', '.join(map(str, config['start_seeds']))}")
     if hidden:
-        names = ", ".join(f"{name} ({n} values)" for name, n in hidden.items())
+        names = ", ".join(f"{name} ({counted(n, 'value')})" for name, n in hidden.items())
         told.append(f"shown beside the observation, since the environment hides it: {names}")
     return "; ".join(told) + "."
 
 
 def _lost(told: Mapping[str, Any]) -> Iterator[RenderableType]:
     """What the dataset lacks, or what of it was not taken; nothing where that is nothing."""
-    lost = [f"{told[key]:,} {words}" for key, words in LOST.items() if told.get(key)]
+    lost = [f"{counted(told[key], noun)} {what}" for key, (noun, what) in LOST.items() if told.get(key)]
     if lost:
-        yield f"Of the {told['episodes']:,} episodes learned from: {'; '.join(lost)}."
+        yield f"Of the {counted(told['episodes'], 'episode')} learned from: {'; '.join(lost)}."
 
 
 def _recorded_in(out: Path) -> str:
@@ -135,7 +135,7 @@ def _table(table: Mapping[str, Any]) -> str:
     if not table["exact"]:
         kept = (("Hidden state", "hidden_state"), ("Checked against the environment:", "checked"))
         told += [f"{what} {table[key]}." for what, key in kept if table.get(key)]
-    return f"{table['reachable']:,} reachable states, {table['actions']} actions. {' '.join(told)}"
+    return f"{counted(table['reachable'], 'reachable state')}, {counted(table['actions'], 'action')}. {' '.join(told)}"
 
 
 def _reward(certificate: Mapping[str, Any], metrics: Mapping[str, Any]) -> Table:

@@ -23,7 +23,15 @@ from irl_gym.environments.learned_reward import LearnedReward
 from irl_gym.environments.reveal import layers
 from irl_gym.environments.tabular_env import TabularEnv
 from irl_gym.environments.watching_wrappers import only_watches
-from irl_gym.errors import InvalidParameter, InvalidReward, IrlGymError, NotDiscrete, NotTabular, UnknownEnvironment
+from irl_gym.errors import (
+    InvalidParameter,
+    InvalidReward,
+    IrlGymError,
+    NotDiscrete,
+    NotTabular,
+    UnknownEnvironment,
+    did_you_mean,
+)
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.spaces.states import StateIndex
@@ -137,15 +145,18 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         _check_named(env_id, error, kwargs)
         unexpected = re.search(r"unexpected keyword argument '(\w+)'", str(error))
         if unexpected:
+            names = _arguments_of(env_id)
+            known = f" ({', '.join(names)})" if names else ""
             raise InvalidParameter(
                 f"{env_id} takes no argument {unexpected[1]!r}: expected those of the environment's constructor"
-                f"{_arguments_of(env_id)}."
+                f"{known}.{did_you_mean(unexpected[1], names)}"
             ) from error
         raise InvalidParameter(f"{env_id} cannot be made with {kwargs}: {type(error).__name__}: {error}.") from error
     except (gym.error.Error, ModuleNotFoundError) as error:
         module, _, name = env_id.rpartition(":")
-        if module and isinstance(error, ModuleNotFoundError) and f"'{module}'" in str(error):
-            raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(module)}") from error
+        missing = getattr(error.__cause__, "name", None)
+        if module and missing and f"{module}.".startswith(f"{missing}."):  # else it is of something that the module imports
+            raise UnknownEnvironment(f"environment is {env_id!r}, and {no_module(missing, name)}") from error
         if not isinstance(error, gym.error.UnregisteredEnv | gym.error.DeprecatedEnv) and "Malformed" not in str(error):
             raise InvalidParameter(f"{env_id} cannot be made here: {error}") from error  # the message says what is missing
         known = {one: f"{module}:{one}" if _made_by(module, one) else one for one in gym.registry if one not in NO_WORLDS}
@@ -189,14 +200,13 @@ def _check_named(env_id: str, error: Exception, kwargs: dict[str, Any]) -> None:
         ) from error
 
 
-def _arguments_of(env_id: str) -> str:
-    """The names of an environment's arguments, in brackets; nothing where they cannot be told."""
+def _arguments_of(env_id: str) -> list[str]:
+    """The names of an environment's arguments; none where they cannot be told."""
     entry = gym.spec(env_id.rpartition(":")[2]).entry_point
     maker = load_env_creator(entry) if isinstance(entry, str) else entry
     if maker is None:
-        return ""
-    names = [name for name in inspect.signature(maker).parameters if name != "render_mode"]
-    return f" ({', '.join(names)})" if names else ""
+        return []
+    return [name for name in inspect.signature(maker).parameters if name != "render_mode"]
 
 
 def _check_flags(env: gym.Env, kwargs: dict[str, Any]) -> None:

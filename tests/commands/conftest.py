@@ -37,6 +37,10 @@ class Asker(Twin):
     def learn(self, problem, rng):
         actions = [problem.oracle.ask(state) for state in range(problem.dynamics.n_states)]
         return FiniteLP().fit(problem.dynamics, np.array(actions))
+
+class Broken(Twin):
+    def learn(self, problem, rng):
+        return np.zeros(3)[7]
 """,
 }
 

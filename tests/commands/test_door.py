@@ -147,8 +147,9 @@ def test_a_first_word_without_a_name_is_what_the_subcommand_is_of(irl_gym, here)
 def test_a_continuous_world_is_told_with_two_commands_that_run(irl_gym, here):
     said = irl_gym("run", "--env-id", "MountainCar-v0", "--env-kwargs", "goal_velocity=0.01").errors
     told = [shlex.split(one)[1:] for one in re.findall(r"`(irl-gym [^`]*)`", said)]
-    assert [one[-2:] for one in told] == [["--bins", "31"], ["--learner", "trajectory-lp"]]
-    few = (("--retrain", "value-iteration"), ("--total-timesteps", "2048", "--rounds", "1"))
+    assert told[0][-4:] == ["--bins", "31", "--retrain", "value-iteration"]
+    assert told[1][-2:] == ["--learner", "trajectory-lp"]
+    few = ((), ("--total-timesteps", "2048", "--rounds", "1"))
     for words, less in zip(told, few, strict=True):
         done = irl_gym(*words, *less, "--episodes", "2")
         assert done.code == 0 and "Under the true reward" in done.out, done.errors
@@ -185,3 +186,23 @@ def test_an_installed_module_comes_before_one_of_that_name_where_the_user_stands
 def test_python_that_is_asked_to_trust_no_folder_trusts_none(here):
     told = process("-P", "-m", "irl_gym", "run", "--learner", "own_learner_here:Twin", cwd=here).stderr
     assert "no module 'own_learner_here', which was looked for among what is installed" in told
+
+
+def test_an_error_in_a_learner_of_the_users_own_is_told_as_theirs(irl_gym, here):
+    done = irl_gym("run", "--env-id", "own_env_here:Pond-v0", "--learner", "own_learner_here:Broken", *FEW, "--out", "run")
+    told = f"Code that is not irl_gym's raised an error, {here / 'own_learner_here.py'}, line 23, in learn: IndexError: "
+    assert done.code == 70 and done.errors.startswith(told), done.errors
+
+
+def test_an_own_module_that_python_cannot_read_is_told_as_theirs(irl_gym, here):
+    (here / "own_learner_here.py").write_text("class Twin\n")
+    done = irl_gym("learners", "own_learner_here:Twin")
+    told = f"Code that is not irl_gym's raised an error, {here / 'own_learner_here.py'}, line 1: SyntaxError: "
+    assert done.code == 70 and done.errors.startswith(told), done.errors
+
+
+def test_what_an_own_module_imports_and_python_does_not_find_is_named(irl_gym, here):
+    (here / "own_env_here.py").write_text("import nowhere_to_be_found\n")
+    done = irl_gym("tabulate", "own_env_here:Pond-v0")
+    assert done.code == 2 and "No module named 'nowhere_to_be_found'" in done.errors
+    assert "there is no module 'own_env_here'" not in done.errors

@@ -75,3 +75,16 @@ def test_a_file_becomes_a_dataset(irl_gym, here):
     assert done.code == 0 and done.out.startswith("me/log-v0: 2 episodes, 3 steps, "), done.errors
     found = [*read_minari("me/log-v0", root=here)]
     assert [one.actions.tolist() for one in found] == [[1, 1], [2]] and np.array_equal(found[0].observations[:2], [0, 4])
+
+
+def test_one_of_a_kind_is_told_in_the_singular(irl_gym, here):
+    (here / "log.csv").write_text("episode,step,cell,action\na,0,0,1\n")
+    asked = ("--csv", "log.csv", "--observation-columns", "cell", "--dataset-id", "me/log-v0", "--root", ".")
+    done = irl_gym("export", "--env-id", "FrozenLake-v1", *asked)
+    assert done.code == 0 and done.out.startswith("me/log-v0: 1 episode, 1 step, "), done.errors
+
+
+def test_of_several_columns_all_are_named_where_one_is_mistyped(irl_gym, here):
+    (here / "log.csv").write_text("episode,step,x1,x2,action\na,0,0,0,1\n")
+    done = irl_gym("run", "--env-id", "CartPole-v1", "--csv", "log.csv", "--observation-columns", "x1", "y2")
+    assert done.code == 2 and "Did you mean --observation-columns x1 x2?" in done.errors

@@ -1,6 +1,7 @@
 """What scripts say in a terminal."""
 
 import io
+import json
 import re
 
 import pytest
@@ -101,11 +102,31 @@ def test_an_error_shows_what_a_terminal_would_obey_and_does_not_send_it(capsys):
     assert not set("\x1b\x07\x9b\u202e\ud800") & set(said) and "\\x1b]0;title\\x07" in said and "\nexpected é" in said
 
 
-def test_whose_defect_may_be_is_said(capsys):
-    def broken():
-        raise ZeroDivisionError("\x1b[31mof what")
+def raising(module):
+    """What raises an error, as a function of a module does."""
+    code = compile('def broken():\n    raise ZeroDivisionError("\x1b[31mof what")', "/home/me/own.py", "exec")
+    exec(code, names := {"__name__": module})
+    return names["broken"]
 
-    assert exit_code(broken, others="the environment") == DEFECT == 70
+
+def test_an_error_in_code_of_the_users_own_is_told_with_its_place(capsys):
+    assert exit_code(raising("own"), others="the environment") == DEFECT
+    told = "Code that is not irl_gym's raised an error, /home/me/own.py, line 2, in broken: ZeroDivisionError: "
+    assert capsys.readouterr().err.startswith(told)
+
+
+def test_an_error_of_a_package_that_own_code_called_is_told_with_the_place_of_that_code(capsys):
+    def read():
+        return json.loads("{")
+
+    assert exit_code(read) == DEFECT
+    told = f"Code that is not irl_gym's raised an error, {__file__}, line "
+    said = capsys.readouterr().err
+    assert said.startswith(told) and ", in read: JSONDecodeError" in said
+
+
+def test_whose_defect_may_be_is_said(capsys):
+    assert exit_code(raising("irl_gym.mdp.made_up"), others="the environment") == DEFECT == 70
     said = capsys.readouterr().err
     told = "This is a defect of irl_gym or of the environment, not of your files: ZeroDivisionError: \\x1b[31mof what. Please"
     assert said.startswith(told) and "Traceback (most recent call last)" in said and "in broken" in said

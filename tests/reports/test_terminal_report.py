@@ -112,9 +112,11 @@ def test_a_run_that_could_not_be_examined_is_not_called_healthy(tmp_path):
 
 def test_what_a_dataset_lacks_is_told_with_its_count(tmp_path):
     lost = {"given": True, "episodes_only": True, "episodes": 1200, "dataset": "me/log-v0", "dropped": 1000, "steps_cut": 17}
-    told = "Of the 1,200 episodes learned from: 1,000 episodes whose last action was dropped when they were imported"
+    told = "Of the 1,200 episodes learned from: 1,000 episodes whose last action was dropped in the import"
     text = said(tmp_path, demonstrations=lost)
     assert told in text and "17 steps cut off after an end." in text
+    text = said(tmp_path, demonstrations=lost | {"episodes": 1, "dropped": 1, "steps_cut": 1})
+    assert "Of the 1 episode learned from: 1 episode whose last" in text and "1 step cut off after an end." in text
 
 
 def test_what_is_wrong_with_the_given_expert_is_told_at_once(tmp_path):

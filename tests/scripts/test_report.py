@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from types import FunctionType
 
 import pytest
 from forgetting import without_digests
@@ -53,20 +54,19 @@ def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     [
         ("report", ("--run", "run"), "irl_gym.reports.page.report.write_report"),
         ("doctor", ("--run", "run"), "irl_gym.runs.diagnosed.diagnose"),
-        ("compare", ("run", "run"), "irl_gym.reports.comparison.comparison_page.write_comparison"),
+        ("compare", ("run", "again"), "irl_gym.reports.comparison.comparison_page.write_comparison"),
         ("doctor", ("--run", "run"), "irl_gym.runs.run.claims"),
     ],
 )
 def test_a_defect_is_called_one_and_is_told_with_its_traceback(script, copied, monkeypatch, name, arguments, place):
-    def broken(*_):
-        raise KeyError("policies")
-
+    broken = FunctionType((lambda *_: {}["policies"]).__code__, {"__name__": "irl_gym.broken"})
     monkeypatch.setattr(place, broken)
+    shutil.copytree(copied / "run", copied / "again")
     made = script(name, *arguments, cwd=copied)
     told = (
         "This is a defect of irl_gym, not of your files: KeyError: 'policies'. Please report it with this traceback:\nTraceback"
     )
-    assert made.returncode == 70 and made.stderr.startswith(told) and "in broken" in made.stderr
+    assert made.returncode == 70 and made.stderr.startswith(told) and "in <lambda>" in made.stderr
 
 
 def test_a_page_that_cannot_be_written_gets_one_clear_line(script, planned, tmp_path):

@@ -25,7 +25,7 @@ from irl_gym.agents.planners import SB3, Agent, load_agent, tabular_actions
 from irl_gym.checks import checked_number, discrete_actions
 from irl_gym.demonstrations.export import Demonstrator
 from irl_gym.demonstrations.minari_files import spec_json, unkept
-from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular, did_you_mean
 from irl_gym.loop.table_world import TableWorld, step_limit
 from irl_gym.loop.worlds import SteppedWorld
 from irl_gym.mdp.episodes import Episode, collect, collect_from_table
@@ -143,7 +143,7 @@ class Recording:
         if self.expert not in NAMED and not is_file(self.expert):
             raise InvalidParameter(
                 f"expert is {self.expert!r}, which is no file: expected one of {', '.join(NAMED)}, or the path of SB3's zip "
-                "or of an npz of actions."
+                f"or of an npz of actions.{did_you_mean(self.expert, NAMED)}"
             )
         if self.expert_normalize is not None and self.expert in NAMED:
             raise InvalidParameter(

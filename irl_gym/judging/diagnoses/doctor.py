@@ -144,7 +144,7 @@ def _examined(case: Case) -> str:
     beyond[case.rows.states[case.unsettled]] = False
     margins, judged = case.least[beyond], int(np.isfinite(case.least).sum())
     if not margins.size:
-        return f"Examined: {where}. No margin of {judged:,} states is beyond its sampling error."
+        return f"Examined: {where}. No margin of {counted(judged)} is beyond its sampling error."
     return (
         f"Examined: {where}. The reward prefers the expert's action in {margins.size:,} of {judged:,} that it can judge, by "
         f"{margins.min():.3g} to {margins.max():.3g}."

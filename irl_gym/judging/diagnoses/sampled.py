@@ -13,7 +13,7 @@ def inexpressible(case: Case) -> Finding | None:
     rank, K, states = case.claims["rank"], case.claims["n_features"], case.claims["states"]
     return Finding(
         "inexpressible",
-        f"No reward in the span of the features makes the expert optimal in the {states:,} states of the sample, but those "
+        f"No reward in the span of the features makes the expert optimal in the {counted(states)} of the sample, but those "
         f"that tie it with everything: {K:,} features, of which the rows see {rank:,} directions.",
         "More or other features, one a state (OneHot) where the table is small; or FiniteLP, which needs none.",
         flags=("--features",),
@@ -108,10 +108,10 @@ def cut_short(case: Case) -> Finding | None:
     dropped, largest = case.stats.get("episodes_dropped", 0), max(gaps)
     if truncation <= largest and not dropped:
         return None
-    told = f" {dropped} episodes that were cut off before were dropped." if dropped else ""
+    told = f" Dropped, since cut off before: {counted(dropped, 'episode')}." if dropped else ""
     return Finding(
         "cut-short",
-        f"Trajectories were cut after {case.claims['horizon']} steps, which can change a value by {truncation:.3g}; the "
-        f"largest gap between expert and others is {largest:.3g}.{told}",
+        f"Trajectories were cut after {counted(case.claims['horizon'], 'step')}, which can change a value by {truncation:.3g}; "
+        f"the largest gap between expert and others is {largest:.3g}.{told}",
         "A longer horizon, and episodes of the expert that last as long or end.",
     )

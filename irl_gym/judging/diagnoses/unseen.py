@@ -75,8 +75,9 @@ def dropped_actions(case: Case) -> Finding | None:
         return None
     return Finding(
         "dropped-actions",
-        f"The last action of {told['dropped']:,} of {told['episodes']:,} episodes was dropped when they were imported, with "
-        "what it paid: what the expert does there was not learned, and its value is that of the episodes without it.",
+        f"The last action of {told['dropped']:,} of {counted(told['episodes'], 'episode')} was dropped when they were "
+        "imported, with what it paid: what the expert does there was not learned, and its value is that of the episodes "
+        "without it.",
         "Import them again with last='keep', the default; or with next observations, where the log has them.",
     )
 

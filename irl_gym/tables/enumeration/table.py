@@ -18,6 +18,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl_gym import facts
 from irl_gym.checks import checked_number
 from irl_gym.errors import EnumerationLimit, InvalidParameter, UnknownObservation
 from irl_gym.mdp.tabular_mdp import AS_GOOD_AS_EXACT, TabularMDP
@@ -235,7 +236,7 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -
 def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
     """How the table was obtained, in words that are the same where the search was interrupted and continued."""
     counted = explored.counted["rows"]
-    method = f"Enumeration of {len(explored.keys):,} states from copies of the environment"
+    method = f"Enumeration of {facts.counted(len(explored.keys))} from copies of the environment"
     if explored.outside:
         method = f"The environment draws from {explored.outside}, which is not its own. {method}"
     if not counted:

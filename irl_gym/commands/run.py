@@ -21,6 +21,7 @@ from irl_gym.commands.arguments import Arguments, parse_reveal, parse_seeds
 from irl_gym.commands.learning_arguments import Learning, for_help
 from irl_gym.commands.terminal import exit_code, print_error, read_arguments, stage_bars
 from irl_gym.errors import InvalidParameter, IrlGymError, RunConflict
+from irl_gym.runs.choices import PROGRAM
 
 if TYPE_CHECKING:
     from irl_gym.runs.experiment import Experiment
@@ -51,7 +52,7 @@ def several(arguments: Arguments, words: Sequence[str]) -> int:
         words: of the command line.
     """
     from irl_gym.commands.compare import side_by_side
-    from irl_gym.runs.identity import PROGRAM, without
+    from irl_gym.runs.identity import without
 
     console = Console(soft_wrap=True)
     try:
@@ -84,8 +85,6 @@ def several(arguments: Arguments, words: Sequence[str]) -> int:
 
 
 def _called(arguments: Arguments, words: Sequence[str]) -> int:
-    from irl_gym.runs.identity import PROGRAM
-
     return main(arguments, [*PROGRAM, *words]) if arguments.seeds is None else several(arguments, words)
 
 

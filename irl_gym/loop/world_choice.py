@@ -23,8 +23,8 @@ from irl_gym.errors import (
 from irl_gym.learners.needs import PARTS
 from irl_gym.loop.table_world import TableWorld, step_limit
 from irl_gym.loop.worlds import RunWorld, SteppedWorld
+from irl_gym.runs.choices import PROGRAM
 from irl_gym.runs.experiment import Experiment
-from irl_gym.runs.identity import PROGRAM
 from irl_gym.spaces.coordinates import coordinates_of
 from irl_gym.tables.discretize import discretize
 from irl_gym.tables.enumeration.table import Enumeration

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
+PROGRAM = ["irl-gym", "run"]
+"""How a run's command begins, unless another program started it: this works wherever irl_gym is installed."""
 PlannerName = Literal["value-iteration", "ppo", "dqn", "a2c"]
 FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 Reveals = Mapping[str, int | Sequence[Any]] | Literal["known"]

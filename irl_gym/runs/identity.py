@@ -29,7 +29,7 @@ from irl_gym.files.run_folder import (
     write_json,
     write_record,
 )
-from irl_gym.runs.choices import TAKEN
+from irl_gym.runs.choices import PROGRAM, TAKEN
 from irl_gym.spaces.names import action_names
 from irl_gym.tables.table_files import TABLE, UNDER_WAY
 
@@ -40,8 +40,6 @@ FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 STAGES = (*FIRST, "record", "ambiguity", "report")
 """All stages after the table."""
 VERSION, ENVIRONMENT = "run.json", "environment.json"
-PROGRAM = ["irl-gym", "run"]
-"""How a run's command begins, unless another program started it: this works wherever irl_gym is installed."""
 SWITCHES = {"--shaping": "--no-shaping"}
 """Flags of mends that have no value, and their opposites."""
 NEW_FOLDER = "runs/again"

@@ -151,7 +151,9 @@ def test_a_folder_that_may_not_be_written_gets_one_clear_line(monkeypatch, tmp_p
 
     monkeypatch.setattr("irl_gym.loop.pipeline.recover_and_retrain", refused)
     assert run_command.main(Arguments(out=tmp_path), []) == 2
-    assert capsys.readouterr().err == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'\n"
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == f"PermissionError: [Errno 13] Permission denied: '{tmp_path / '.lock'}'"
+    assert len(said) == 3 and said[0] == "loading: begun"
 
 
 AGENT = "irl_gym.agents.planners:SB3.plan"

@@ -142,7 +142,7 @@ def test_a_folder_of_something_else_is_refused_before_any_work(tmp_path, name):
             HiddenState,
             r"clock: 4 against 2.*--reveal name=number, --table sample.*--learner trajectory-lp",
         ),
-        ({"env_id": "CartPole-v1"}, NotDiscrete, r"give bins.*--learner trajectory-lp"),
+        ({"env_id": "CartPole-v1"}, NotDiscrete, r"--bins 5.*--learner trajectory-lp"),
         ({"env_id": "Blackjack-v1", "reveal": {}}, NotTabular, "Reveal"),
         ({"env_id": "FrozenLake-v1", "bins": 5}, InvalidParameter, "Leave bins out"),
         ({"reveal": {"clocks": 5}}, InvalidParameter, "closest to it are clock"),

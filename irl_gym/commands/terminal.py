@@ -59,7 +59,7 @@ def _check_choices(kind: type, words: Sequence[str]) -> None:
         if kinds and all(get_origin(one) is Literal for one in kinds):
             for flag, value in given:
                 if flag.replace("_", "-") == f"--{name.replace('_', '-')}" and not value.startswith("-"):
-                    checked_name(flag, value, [choice for one in kinds for choice in get_args(one)])
+                    checked_name(flag, value, [str(choice) for one in kinds for choice in get_args(one)])
 
 
 FIRST = ("env_id", "run", "environment")

@@ -40,7 +40,8 @@ def test_a_folder_that_is_no_run_gets_one_clear_line(script, tmp_path):
 def test_a_run_of_another_format_gets_one_clear_line(script, copied, name):
     held = without_digests(copied / "run") / "certificate.json"
     told = json.loads(held.read_text())
-    held.write_text(json.dumps({**told, "proof": {**told["proof"], "margin": "wide", "margin_cap": [], "states": "all"}}))
+    terms = {**told["proof"]["terms"], "margin": "wide", "margin_cap": [], "states": "all"}
+    held.write_text(json.dumps({**told, "proof": {**told["proof"], "terms": terms}}))
     (copied / "run" / "metrics.json").write_text(json.dumps({"policies": [], "table": {"states": 16}, "reward": "good"}))
     made = script(name, "--run", "run", cwd=copied)
     assert "Traceback" not in made.stderr and made.stderr.count("\n") <= 1

@@ -68,7 +68,7 @@ def test_tabulate_refuses_a_wrapper_around_a_learned_reward_that_changes_it():
 @pytest.mark.parametrize("env", [NoStart(coin()), PairsObserved(TableEnv(coin(), [1, 0]))], ids=["no start", "pairs"])
 def test_tabulate_enumerates_what_publishes_half_a_table(env):
     table = table_of(env)
-    assert "Enumeration of 1 states" in table.evidence.method
+    assert "Enumeration of 1 state" in table.evidence.method
     assert (table.mdp.P.toarray()[:1].tolist(), table.mdp.d0.tolist()) == ([[0.5, 0.5]], [1.0, 0.0])
 
 

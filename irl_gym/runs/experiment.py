@@ -161,7 +161,8 @@ def _check_needs(learner: Any, env_id: str | None, dataset: str | None, epsilon:
         told = f"Leave dataset out, and give env_id. (On the command line: --env-id {env} without --dataset or --csv.)"
         if dataset is None:
             told = "Leave epsilon out. (On the command line: the same without --epsilon.)"
-        lacks |= dict.fromkeys(("expert", "oracle"), ("the expert is known by its episodes only", told))
+        unknown = ("expert",) if dataset is None else ("expert", "oracle")  # one that errs can still be asked
+        lacks |= dict.fromkeys(unknown, ("the expert is known by its episodes only", told))
     part = learner.needs.lacking({*PARTS} - {*lacks})
     if part is not None:
         why, mend = lacks[part.split(OR)[0]]

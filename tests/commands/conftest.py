@@ -38,6 +38,11 @@ class Asker(Twin):
         actions = [problem.oracle.ask(state) for state in range(problem.dynamics.n_states)]
         return FiniteLP().fit(problem.dynamics, np.array(actions))
 
+class Knower(Twin):
+    needs: ClassVar = replace(FiniteLP.needs, required=("dynamics", "expert"))
+    def learn(self, problem, rng):
+        return FiniteLP().fit(problem.dynamics, problem.expert)
+
 class Broken(Twin):
     def learn(self, problem, rng):
         return np.zeros(3)[7]

@@ -8,6 +8,7 @@ LOG = "episode,step,cell,action\na,0,0,1\na,1,2,2\n"
 POND = ("--env-id", "FrozenLake-v1", "--env-kwargs", 'desc=["SF","FG"]', "is_slippery=false")
 CSV = ("--csv", "log.csv", "--observation-columns", "cell", "--retrain", "value-iteration")
 ASKER = ("--learner", "own_learner_here:Asker", "--retrain", "value-iteration", "--episodes", "5")
+KNOWER = ("--learner", "own_learner_here:Knower", *ASKER[2:])
 CASES = [
     ("expected a subcommand, as in `irl-gym run --env-id FrozenLake-v1`.", ("--env-id", "FrozenLake-v1"),
      ("learners", "--markdown")),
@@ -35,7 +36,7 @@ CASES = [
      ("export", *POND, "--dataset-id", "me/log-v0", "--root", ".", "--expert", "value-iteration", "--episodes", "2")),
     ("Did you mean 'is_slippery'?", ("tabulate", *POND[:4], "is_slipery=false"), ("tabulate", *POND)),
     ("Leave epsilon out. (On the command line: the same without --epsilon.)",
-     ("run", *POND, *ASKER, "--epsilon", "0.1"), ("run", *POND, *ASKER)),
+     ("run", *POND, *KNOWER, "--epsilon", "0.1"), ("run", *POND, *KNOWER)),
     ("Leave dataset out, and give env_id. (On the command line: --env-id FrozenLake-v1 without --dataset or --csv.)",
      ("run", *POND, *CSV, *ASKER[:2]), ("run", *POND, *ASKER)),
     ("Choose another --out.", ("run", *POND, *CSV, "--out", "taken"), ("run", *POND, *CSV, "--out", "other")),

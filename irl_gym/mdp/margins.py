@@ -133,6 +133,11 @@ class JudgedRows:
         """(n,) rows whose margin is none, and no violation: not those that rounding hides."""
         return self.found.tied
 
+    @property
+    def unsettled(self) -> np.ndarray:
+        """(k,) rows with a margin that is within its sampling error; none on an exact table."""
+        return np.flatnonzero(self.usable & (self.margins > self.none) & (self.margins <= self.errors))
+
 
 def margins_under(mdp: TabularMDP, comparisons: Comparisons, reward: TabularReward, *, best: bool) -> tuple[Optimum, Margins]:
     """What acting best is worth under a reward, and the margins of (4): where everybody acts best afterwards, or the expert."""

@@ -11,13 +11,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from irl_gym._typing import ActionSets, Indices, Matrix, Numbers, StateMask, Vector
+from irl_gym._typing import ActionSets, Indices, Matrix, Numbers, StateMask
 from irl_gym.errors import DegenerateExpert, IrlGymError
 from irl_gym.judging.metrics import Tie, ties_of, worst_tie
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.proofs.finite_proof import served
-from irl_gym.mdp.margins import JudgedRows, Margins, least_per_state, margins_under
+from irl_gym.mdp.margins import JudgedRows, Margins, margins_under
+from irl_gym.mdp.optimality import Optimality, certify
 from irl_gym.mdp.optimality_rows import compare
 from irl_gym.mdp.planning.discounted import EPSILON
 from irl_gym.mdp.planning.dynamic_programming import optimum
@@ -166,36 +167,23 @@ class Case:
         either = c.equal
         if self.reward is not None:
             # As `certify`: what follows an unknown state, or an error, is worth what acting best is.
-            best = not self.fully_known or bool(self.claims.get("errs", self.claims.get("slack") is not None))
+            best = not self.fully_known or self.errs
             margins, either = margins_under(part, c, self.reward.of_rows(keep), best=best)[1], c.equal & (not best)
             if c.sampling is not None:
                 errors = c.sampling.of_margins(margins.worth)
         usable = ~c.equal & (~c.trivial | (not self.on_states))
         return JudgedRows(keep[c.states], c.actions.astype(np.int64), c.equal, c.trivial, margins, either, usable, errors)
 
-    @property
-    def _kept(self) -> np.ndarray:
-        """(n,) rows that a margin is taken over: ties that no reward breaks, as a program finds now, are left out."""
-        rows = self.rows
-        assert rows is not None
-        tied = rows.usable & rows.tied
-        possible = self.can_have_margin if self.speaks and tied.any() else None
-        return rows.usable if possible is None else rows.usable & ~(tied & ~possible[rows.states, rows.actions])
-
     @cached_property
-    def least(self) -> Vector:
-        """(S,) the smallest margin of each state; NaN where it has no row that a reward can move."""
+    def optimality(self) -> Optimality | None:
+        """What R says of the expert, ties that no reward breaks left out as a program finds them now; None without either."""
         if self.rows is None or self.mdp is None or self.reward is None:
-            return np.full(self.acting.size, np.nan)
-        usable = self._kept
-        return least_per_state(self.rows.margins[usable], self.rows.states[usable], self.mdp.n_states)
-
-    @cached_property
-    def unsettled(self) -> Indices:
-        """(k,) rows with a margin that is within its sampling error; none on an exact table."""
-        if (rows := self.rows) is None:
-            return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(rows.usable & (rows.margins > rows.none) & (rows.margins <= rows.errors))
+            return None
+        tied = self.rows.usable & self.rows.tied
+        possible = self.can_have_margin if self.speaks and tied.any() else None
+        pairs = np.column_stack([self.rows.states[tied], self.rows.actions[tied]])
+        without = None if possible is None else pairs[~possible[pairs[:, 0], pairs[:, 1]]]
+        return certify(self.mdp, self.expert, self.reward, errs=self.errs, unbreakable=without)
 
     @property
     def counted(self) -> bool:
@@ -204,16 +192,22 @@ class Case:
 
     @cached_property
     def beyond(self) -> StateMask:
-        """(S,) states in which every row that R can move has a margin, beyond its own rounding as `certify` counts it."""
-        found = np.isfinite(self.least)
-        if self.rows is not None:
-            found[self.rows.states[self._kept & ~self.rows.found.positive]] = False
+        """(S,) states in which every row that R can move has a margin, beyond its own rounding."""
+        if (told := self.optimality) is None:
+            return np.zeros_like(self.acting)
+        found = np.isfinite(told.margin)
+        found[told.marginless] = False
         return found
 
     @property
     def margins(self) -> Numbers:
         """(m,) their smallest margins."""
-        return self.least[self.beyond]
+        return np.zeros(0) if self.optimality is None else self.optimality.margin[self.beyond]
+
+    @property
+    def errs(self) -> bool:
+        """May the expert err, as the learner took it?"""
+        return bool(self.claims.get("errs", self.claims.get("slack") is not None))
 
     @cached_property
     def prefers(self) -> bool:

@@ -138,11 +138,11 @@ def _examined(case: Case) -> str:
         return f"Examined: what the learner proved{', and what episodes showed' if case.judged else ''}."
     where = f"{counted(int(case.acting.sum()))} of {counted(case.mdp.n_actions, 'action')} each, gamma {case.mdp.gamma}"
     where += ", on a counted table" if case.counted else ""
-    beyond = case.beyond.copy()
-    if case.rows is None or not beyond.any():
+    beyond, told = case.beyond.copy(), case.optimality
+    if told is None or not beyond.any():
         return f"Examined: {where}."
-    beyond[case.rows.states[case.unsettled]] = False
-    margins, judged = case.least[beyond], int(np.isfinite(case.least).sum())
+    beyond[told.unsettled] = False
+    margins, judged = told.margin[beyond], int(np.isfinite(told.margin).sum())
     if not margins.size:
         return f"Examined: {where}. No margin of {counted(judged)} is beyond its sampling error."
     return (

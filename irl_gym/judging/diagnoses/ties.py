@@ -111,8 +111,8 @@ def unbreakable_ties(case: Case) -> Finding | None:
 
 def unsettled(case: Case) -> Finding | None:
     """A margin on a counted table is one only where it exceeds its sampling error (`irl_gym.mdp.sampling_error`)."""
-    rows, which = case.rows, case.unsettled
-    if rows is None or not (case.judges_states and case.speaks) or not which.size:
+    rows = case.rows
+    if rows is None or not (case.judges_states and case.speaks) or not (which := rows.unsettled).size:
         return None
     which = which[np.argsort(rows.margins[which] - rows.errors[which], kind="stable")]
     left = f"{rows.errors[which].min():.2g} to {rows.errors[which].max():.2g}"

@@ -92,9 +92,9 @@ def _choices_vanish(case: Case, gamma: float | None) -> np.ndarray | None:
 
 def gamma_near_one(case: Case) -> Finding | None:
     """I - gamma P_pi has a condition number of about 1 / (1 - gamma), by which rounding and solvers' residuals grow in V."""
-    if case.mdp is None or case.scale == 0 or not case.speaks:
+    if case.mdp is None or case.scale == 0 or not case.speaks or (told := case.optimality) is None:
         return None
-    margins, left_open = case.least[case.least > 0], _left_open(case.scale, case.mdp.gamma)
+    margins, left_open = told.margin[told.margin > 0], _left_open(case.scale, case.mdp.gamma)
     if not margins.size or left_open <= max(VANISHED * case.scale, 0.1 * (typical := float(np.median(margins)))):
         return None
     tried = (g for g in (0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999) if g < case.mdp.gamma)

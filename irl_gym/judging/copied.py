@@ -7,12 +7,13 @@ of their difference: against what exact values say only if all of it is beyond `
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Literal
 
 from irl_gym.intervals import Interval
 from irl_gym.judging.scores import CLONE, EXPERT, FEWEST, RANDOM, agent_of, score_of, the
 from irl_gym.judging.shares import difference, returns_of, share_of_return
-from irl_gym.written import with_ends
+from irl_gym.written import number, with_ends
 
 Copied = Literal["as well", "worse", "undecided"]
 NEAR = 0.01
@@ -65,12 +66,15 @@ def copied_told(metrics: Mapping[str, Any], episodes: int) -> str:
         "undecided": "Whether copying the demonstrations does as well here is undecided",
     }[answer]
     scores = clone["score"], rows[name]["score"]
-    less = "" if None in scores or answer != "worse" or scores[0] >= scores[1] else f", {scores[1] - scores[0]:.3f} less"
-    return f"{opening}: the clone ({clone['how']}) has {_earned(clone)}{less}; {the(name)} has {_earned(rows[name])}."
+    less = (
+        "" if None in scores or answer != "worse" or scores[0] >= scores[1] else f": {scores[1] - scores[0]:.3f} of score less"
+    )
+    found = " and ".join(f"{what} {one}" for what, one in _earned(clone).items()).replace("of above", "above")
+    return f"{opening}: the clone ({clone['how']}) has {found}, {the(name)} {' and '.join(_earned(rows[name]).values())}{less}."
 
 
-def _earned(row: Mapping[str, Any]) -> str:
-    """A row's mean return and score, where it has them; the score last."""
-    returns = returns_of(row)
-    told = [] if returns is None else [f"a mean return of {with_ends(returns)}"]
-    return " and ".join([*told, *([] if row["score"] is None else [f"a score of {score_of(row['score'])}"])])
+def _earned(row: Mapping[str, Any]) -> dict[str, str]:
+    """A row's mean return and score, where it has them."""
+    returns, score = returns_of(row), row["score"]
+    told = {} if returns is None else {"a mean return of": with_ends(returns, partial(number, digits=3))}
+    return told if score is None else {**told, "a score of": score_of(score)}

@@ -187,7 +187,7 @@ def cloned(
     except IrlGymError as error:  # one of whoever else is judged would have stopped the run
         return {"no_clone": f"{type(error).__name__}: {error}"}
     world.keep(outcome.policy, folder, CLONE)
-    more = {"expert": "was given the expert's whole policy", "oracle": "could ask the expert"}
+    more = {"expert": "had the expert's whole policy", "oracle": "could ask the expert"}
     told = [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
     return {"how": f"{outcome.proof.brief}{''.join(told)}"}
 

@@ -48,7 +48,7 @@ class CloneProof:
     @property
     def brief(self) -> str:
         """How the clone came about, in a few words."""
-        never = f"{self.unshown:,} of {counted(self.acting, 'state')} never seen: {self.elsewhere}"
+        never = f"{self.unshown:,} of {counted(self.acting, 'state')} never seen"
         return f"cloned from {self.steps:,.0f} steps; {never if self.unshown else 'every state was seen'}"
 
     def facts(self) -> tuple[Fact, ...]:

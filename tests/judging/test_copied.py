@@ -9,13 +9,8 @@ EXACT, COUNTED = {"exact": True}, {"exact": False}
 
 
 def row(score, mean, half=None):
-    return {
-        "how": "made",
-        "score": score,
-        "mean_return": mean,
-        "return_low": half and mean - half,
-        "return_high": half and mean + half,
-    }
+    low, high = (None, None) if half is None else (mean - half, mean + half)
+    return {"how": "made", "score": score, "mean_return": mean, "return_low": low, "return_high": high}
 
 
 def metrics(clone, retrained, table=EXACT, random=(0.0, 0.0), expert=(1.0, 100.0)):

@@ -86,7 +86,7 @@ class NeuralClone:
                 f"device is {self.device!r}: expected a name that torch knows, such as cpu or cuda."
             ) from error
 
-    def learn(self, problem: Problem, rng: np.random.Generator) -> Outcome[None, NeuralProof]:
+    def learn(self, problem: Problem, rng: np.random.Generator, on_epoch: Epoch | None = None) -> Outcome[None, NeuralProof]:
         """The same as `fit`, of a problem; where SB3 takes no such observations it is shown the rows of the table.
 
         Raises:
@@ -104,7 +104,7 @@ class NeuralClone:
             parts = [take(one.observations, slice(None, -1)) for one in episodes]
             seen = by_part(lambda *arrays: np.concatenate(arrays), *parts)
         taken, lengths = np.concatenate([one.actions for one in episodes]), [len(one) for one in episodes]
-        found = self.fit(seen, taken, space, actions, lengths=lengths, rng=rng)
+        found = self.fit(seen, taken, space, actions, lengths=lengths, rng=rng, on_epoch=on_epoch)
         return Outcome(None, found.status, found.proof, found.stats, Agent(found.policy.model, states))
 
     def fit(

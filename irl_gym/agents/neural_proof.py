@@ -29,6 +29,11 @@ class NeuralProof:
     parameters: int
     """Of the network that acts."""
 
+    @property
+    def brief(self) -> str:
+        """How the clone came about, in a few words."""
+        return f"cloned from {self.steps + self.held_out:,} steps by a network, in {counted(self.epochs, 'epoch')}"
+
     def facts(self) -> tuple[Fact, ...]:
         """What it says, in sentences."""
         best = f"{counted(self.epochs, 'epoch')}, of which number {self.kept} was kept"

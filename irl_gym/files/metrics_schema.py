@@ -147,7 +147,7 @@ def _with_references(rows: Any) -> Any:
     lacking = [name for name in ("expert", "random") if name not in rows]
     if lacking:
         raise ValueError(f"a policy {lacking[0]}")
-    if len(rows) < 3:
+    if len({*rows} - {"clone"}) < 3:
         raise ValueError("a policy that is judged, beside expert and random")
     return rows
 
@@ -193,6 +193,7 @@ class Demonstrated(Lost):
     episodes: Count
     given: bool
     episodes_only: bool
+    no_clone: NotRequired[Text]
     trained_return: NotRequired[Number]
     vecnormalize: NotRequired[bool]
 

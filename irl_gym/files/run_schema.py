@@ -93,6 +93,7 @@ class Config(TypedDict):
     env_id: NotRequired[Text | None]
     dataset: NotRequired[Text | None]
     epsilon: NotRequired[Share]
+    eval_episodes: NotRequired[Count]
     shaping: NotRequired[bool]
 
 

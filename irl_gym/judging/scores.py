@@ -9,8 +9,9 @@ another outcome still has a chance of up to a quarter, 1 - 0.05^(1/11), with 95 
 no chance and all episodes are the same, they are all that the expert does, and their value is exact.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import t
@@ -26,6 +27,8 @@ RETRAINED = "retrained"
 """The agent that was retrained on the recovered reward alone: what a run of the loop is about."""
 LEARNED = "learned"
 """The policy that the learner gave, where it gives one."""
+CLONE = "clone"
+"""What copies the demonstrations: judged as the others are, and set beside them."""
 FEWEST = 11
 """Episodes below which their spread is not believed."""
 BLUR = 0.25
@@ -93,8 +96,18 @@ class Scale:
 
 
 def others(policies: Iterable[str]) -> list[str]:
-    """The judged policies that are no references, by their names."""
-    return [name for name in policies if name not in REFERENCES]
+    """The judged policies that a run is about, by their names: neither a reference nor the clone."""
+    return [name for name in policies if name not in (*REFERENCES, CLONE)]
+
+
+def scored(policies: Iterable[str]) -> list[str]:
+    """The same and then the clone, where there is one: those that have a score which is not one by definition."""
+    return sorted((name for name in policies if name not in REFERENCES), key=lambda name: name == CLONE)
+
+
+def in_order(policies: Mapping[str, Any]) -> dict[str, Any]:
+    """The rows of judged policies as they are shown: expert, random actions, the clone, and then what the run is about."""
+    return {name: policies[name] for name in (*REFERENCES, CLONE, *others(policies)) if name in policies}
 
 
 def agent_of(policies: Iterable[str]) -> str:
@@ -115,7 +128,7 @@ def who(policies: Iterable[str]) -> str:
     return "agent" if agent_of(policies) == RETRAINED else "policy"
 
 
-CALLED = {RETRAINED: "retrained agent", LEARNED: "learner's policy"}
+CALLED = {RETRAINED: "retrained agent", LEARNED: "learner's policy", CLONE: "clone"}
 
 
 def called(name: str) -> str:
@@ -130,7 +143,7 @@ def the(name: str) -> str:
 
 def several(name: str) -> str:
     """What such policies of several runs are called."""
-    return {RETRAINED: "retrained agents", LEARNED: "learner's policies"}.get(name, name)
+    return {RETRAINED: "retrained agents", LEARNED: "learner's policies", CLONE: "clones"}.get(name, name)
 
 
 def score_of(score: float | None) -> str:

@@ -152,6 +152,13 @@ def _short_at_best(agent: Interval, expert: Interval, random: Interval) -> float
     return short + float(np.linalg.norm([_up(agent), GOOD * _down(expert), (1 - GOOD) * _down(random)]))
 
 
+def difference(one: Interval, other: Interval) -> Interval:
+    """One mean less another, with its interval; an interval that is unknown adds nothing."""
+    low, high = np.hypot(_down(one), _up(other)), np.hypot(_up(one), _down(other))
+    apart = one.estimate - other.estimate
+    return Interval(apart, float(apart - low), float(apart + high))
+
+
 def _up(mean: Interval) -> float:
     return mean.high - mean.estimate if mean.known else 0.0
 

@@ -6,6 +6,7 @@
     demonstrations  episodes of the expert, a Minari dataset; or the dataset that was given
     reward          a learner's outcome, of what it needs of all that is known: a reward, a policy or both
     agent           a planner that sees only the learned reward, on a table shaped by its expected advantage
+    clone           a copy of the demonstrations, to be judged beside what was learned
     metrics         values under the true reward, exact on tables, and returns of episodes in the environment itself
     figures         rewards, values, policies, learning curve
     record          films of expert and agent, the map, the figures as csv
@@ -33,10 +34,11 @@ from irl_gym.facts import counted
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.files.run_folder import RunFolder
 from irl_gym.judging.curves import NO_CURVE, Curve, read_curve
-from irl_gym.judging.scores import LEARNED
+from irl_gym.judging.scores import CLONE, LEARNED
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.problem import Oracle, Problem, Spaces
-from irl_gym.loop import figures, final_stages, stages
+from irl_gym.loop import stages
+from irl_gym.loop.makers import MAKERS
 from irl_gym.loop.stages import REWARD, OnProgress
 from irl_gym.loop.world_choice import place_of
 from irl_gym.loop.worlds import RunWorld
@@ -44,32 +46,11 @@ from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.experiment import Experiment, as_config
-from irl_gym.runs.identity import STAGES, claim, record_start, write_environment, write_version
+from irl_gym.runs.identity import claim, record_start, write_environment, write_version
 from irl_gym.runs.named_parts import environment_of
 from irl_gym.runs.scorecard import TOLD_STAGES, read_metrics
 from irl_gym.runs.supply import missing, supplied
 from irl_gym.tables.table_files import TABLE
-
-Make = Callable[..., Mapping[str, Any]]
-"""Makes something of a stage of what it needs, in a folder, and returns what is recorded of it."""
-MAKERS: dict[str, tuple[Make, ...]] = dict(
-    zip(
-        STAGES,
-        (
-            (stages.planned_expert, stages.recorded_expert),
-            (stages.played_episodes, stages.recorded_episodes),
-            (stages.learned_outcome,),
-            (stages.retrained_agent,),
-            (stages.metrics,),
-            (figures.of_table, figures.returns, figures.learning_curve),
-            (final_stages.films, final_stages.grid, final_stages.figures_as_csv),
-            (final_stages.diagnosis, final_stages.feasible_set),
-            (final_stages.report,),
-        ),
-        strict=True,
-    )
-)
-"""Who makes each stage, in order: all of them whose needs are there."""
 
 UNFINISHED = 0.999
 """Share of a stage that is told at most before its end."""
@@ -283,6 +264,11 @@ class Loop:
     def agent(self) -> Any:
         """The retrained agent, deterministic: (S,) actions of a table, else a policy; None where there is no reward."""
         return None if self.learned is None else self.world.load(self.folder, "agent")
+
+    @cached_property
+    def clone(self) -> Any:
+        """A copy of the demonstrations, as `agent`; None where the learner's policy is one, or they could not be copied."""
+        return self.world.load(self.folder, CLONE) if self.stage("clone")["files"] else None
 
     @cached_property
     def curve(self) -> Curve:

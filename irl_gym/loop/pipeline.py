@@ -29,14 +29,15 @@ def recover_and_retrain(
         reward.npz, certificate.json                  what was learned; learned_policy.npz of a learner that gives a policy
         reward_shaped.npz                             what to train an agent of one's own on: LearnedReward(env, this file)
         agent.zip, agent_policy.npz                   who was retrained; agent.shown.npz where it was shown rows of states
+        clone_policy.npz                              who copies the demonstrations; clone.zip where there is no table
         learning_curve.csv, tensorboard/              how
         metrics.json, metrics.csv, figures/           how good it is
         films/, grid.json                             episodes to watch; the map of a grid
         diagnosis.json, ambiguity.npz                 what the doctor says; for small tables, how far the reward is left open
         report.html                                   all of it, on a page
-    The same seed and command leave the same bytes, but for agent.zip and tensorboard/, which hold the time, and for the seconds
-    that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last stage, and
-    inside the training of an agent, of which at most a twentieth and one rollout are repeated. On a table that
+    The same seed and command leave the same bytes, but for agents in zips and tensorboard/, which hold the time, and for the
+    seconds that stages took, in .stages/ and in report.html's table of them. A run that was killed goes on after its last
+    stage, and inside the training of an agent, of which at most a twentieth and one rollout are repeated. On a table that
     leaves the same bytes too; where the environment is stepped its episodes begin anew, and the run says at which step.
     .stages/ has the sha256 of every file that is read again: one that is another is named, and nothing is made from it.
 

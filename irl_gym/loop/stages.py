@@ -20,14 +20,14 @@ from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
-from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward, IrlGymError
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
 from irl_gym.files.run_folder import LOGS, write_json
 from irl_gym.files.run_schema import Stats, checked
 from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
-from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
+from irl_gym.judging.scores import CLONE, EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner, Outcome
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
@@ -174,15 +174,33 @@ def retrained_agent(
     return {"planner": type(retrainer).__name__, "how": how_of(retrainer), **_steps(policy, kept)}
 
 
+def cloned(
+    folder: Path, learner: Learner, problem: Problem, world: RunWorld, demonstrations: list[Episode],
+    report_progress: OnProgress,
+) -> dict[str, Any]:  # fmt: skip
+    """A copy of the demonstrations, which is judged beside what was learned; none where that is such a copy itself."""
+    if type(learner) is world.cloner:
+        return {}
+    known = Problem(problem.spaces, demonstrations=demonstrations, dynamics=world.mdp)
+    try:
+        outcome = world.clone(known, lambda share: report_progress("clone", share, ""))
+    except IrlGymError as error:  # one of whoever else is judged would have stopped the run
+        return {"no_clone": f"{type(error).__name__}: {error}"}
+    world.keep(outcome.policy, folder, CLONE)
+    more = {"expert": "had the expert's whole policy", "oracle": "could ask the expert"}
+    told = [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
+    return {"how": f"{outcome.proof.brief}{''.join(told)}"}
+
+
 def metrics(
-    folder: Path, world: RunWorld, expert: Any, agent: Any, learned_policy: Any, given: list[Episode] | None,
+    folder: Path, world: RunWorld, expert: Any, agent: Any, learned_policy: Any, clone: Any, given: list[Episode] | None,
     demonstrations: list[Episode], from_episodes: bool, eval_episodes: int, seed: int, table: Tabulation | None,
     horizon: int | None, tabular: TabularReward | None, config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]],
     certificate: Mapping[str, Any], curve: Curve,
 ) -> dict[str, Any]:  # fmt: skip
     """How good everything is under the true reward."""
     how = came_about(config, records)
-    made = {EXPERT: expert, RANDOM: world.random, LEARNED: learned_policy, RETRAINED: agent}
+    made = {EXPERT: expert, RANDOM: world.random, CLONE: clone, LEARNED: learned_policy, RETRAINED: agent}
     policies = {name: (one, how[name]) for name, one in made.items() if one is not None or name == EXPERT}
     rows, scale = evaluate(
         policies, world, table, horizon, given=None if given is None else demonstrations, episodes_only=from_episodes,

@@ -6,7 +6,7 @@ Axes: S states, A actions, T steps.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -22,6 +22,10 @@ from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.run_folder import RunFolder
 from irl_gym.judging import metrics
 from irl_gym.judging.curves import EPISODES, sampled_returns, two_returns
+from irl_gym.learners.base import Outcome
+from irl_gym.learners.cloning.clone import Clone
+from irl_gym.learners.cloning.proofs import CloneProof
+from irl_gym.learners.problem import Problem
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, collect, collect_from_table, empirical_policy
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, load_actions
 from irl_gym.mdp.rewards import TabularReward
@@ -61,6 +65,8 @@ class TableWorld:
     """Of agents."""
     horizon: int | None = None
     """Steps that values count; None for all. The time limit, where the expert's value is that of episodes that were cut."""
+    cloner: ClassVar[type] = Clone
+    """What copies demonstrations."""
 
     @property
     def gamma(self) -> float:
@@ -145,6 +151,10 @@ class TableWorld:
             return int(self.states.encode(observation, terminated=terminated))
         except UnknownObservation:  # of a table that was sampled
             return None
+
+    def clone(self, problem: Problem, tell: Callable[[float], None]) -> Outcome[None, CloneProof]:
+        """A copy of demonstrations, by counting; random actions where there are none."""
+        return Clone().learn(problem)
 
     def keep_table(self, folder: Path) -> None:
         """Write the table, unless it is there."""

@@ -5,7 +5,7 @@ table has is None elsewhere. On a table a policy is its actions or probabilities
 is whatever has SB3's `predict`, and values are means of episodes. Axes: T steps.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,6 +16,8 @@ from gymnasium import spaces
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
+from irl_gym.agents.neural_clone import NeuralClone
+from irl_gym.agents.neural_proof import NeuralProof
 from irl_gym.agents.noise import Noisy
 from irl_gym.agents.planners import FOR_CONTROL, SB3, Agent, Planner, load_agent
 from irl_gym.agents.simulator import RandomPolicy
@@ -27,6 +29,8 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.run_folder import RunFolder, read_json, write_json
 from irl_gym.files.run_schema import Trained
+from irl_gym.learners.base import Outcome
+from irl_gym.learners.problem import Problem
 from irl_gym.loop.table_world import Choose, Glance, Progress, TableWorld, step_limit
 from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.policies import Policy, generator
@@ -35,6 +39,10 @@ from irl_gym.spaces.batches import batch_of_one
 
 GLANCE = 20
 """Episodes for a point of the learning curve, where there is no table."""
+COPYING = 4_000
+"""Minibatches, at most, that copying demonstrations by a network takes: a few seconds beside the minutes of an agent."""
+BATCH = 128
+"""Steps of a minibatch, at least: where there are more demonstrations than so many minibatches hold, each has more of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +66,8 @@ class SteppedWorld:
     true: ClassVar[None] = None
     layout: ClassVar[None] = None
     horizon: ClassVar[None] = None
+    cloner: ClassVar[type] = NeuralClone
+    """What copies demonstrations."""
 
     def __post_init__(self) -> None:
         check_steppable(self.env)
@@ -113,6 +123,11 @@ class SteppedWorld:
         known = None if reward is None else self.weights(reward)
         paid = [np.nan if known is None else known.of(batch_of_one(one))[0] for one in observations[1:]]
         return [None] * len(observations), np.array(paid, dtype=np.float64)
+
+    def clone(self, problem: Problem, tell: Callable[[float], None]) -> Outcome[None, NeuralProof]:
+        """A copy of demonstrations, by a network that is shown all of them."""
+        learner = copier(sum(map(len, problem.demonstrations or ())))
+        return learner.learn(problem, generator(self.seed), lambda epoch, *_: tell(epoch / learner.epochs))
 
     def keep_table(self, folder: Path) -> None:
         """Write nothing."""
@@ -184,6 +199,12 @@ class SteppedWorld:
 
 RunWorld = TableWorld | SteppedWorld
 """Where a run takes place."""
+
+
+def copier(steps: int) -> NeuralClone:
+    """What copies so many steps: in as many epochs as `COPYING` minibatches make, 1 at least and 100 at most."""
+    batch = max(BATCH, steps // COPYING)
+    return NeuralClone(epochs=min(100, max(1, COPYING * batch // steps)), batch_size=batch, patience=3)
 
 
 def _anew(policy: Any, seed: int) -> Any:

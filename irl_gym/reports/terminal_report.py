@@ -14,10 +14,11 @@ from irl_gym.facts import Fact, counted, harmless
 from irl_gym.files.run_folder import read_json
 from irl_gym.files.run_schema import Diagnosed, EnvironmentFile
 from irl_gym.judging import measures
+from irl_gym.judging.copied import copied_told
 from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.estimated import errors_told
 from irl_gym.judging.measures import explained, no_score, shown
-from irl_gym.judging.scores import EXPERT, REFERENCES, RETRAINED
+from irl_gym.judging.scores import EXPERT, RETRAINED, others
 from irl_gym.judging.shares import judged, judgements, training_fell_short
 from irl_gym.runs.certificates import facts_in
 from irl_gym.runs.identity import ENVIRONMENT
@@ -42,7 +43,7 @@ def render(report: Report) -> Iterator[RenderableType]:
     """The parts of the report, in reading order."""
     out, metrics = report.out, report.metrics
     yield _asked(report.config, report.shown, out)
-    yield _policies(metrics)
+    yield _policies(metrics, report.config)
     yield from _lost(metrics["demonstrations"])
     yield _reward(report.certificate, metrics)
     yield _stages(report.stages, metrics)
@@ -100,7 +101,7 @@ def _recorded_in(out: Path) -> str:
     return f"{harmless(found)}, " if found else ""
 
 
-def _policies(metrics: Mapping[str, Any]) -> Table:
+def _policies(metrics: Mapping[str, Any], config: Mapping[str, Any]) -> Table:
     rows, on_table = metrics["policies"], metrics["table"]
     columns = shown(measures.POLICIES, list(rows.values()))
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
@@ -108,7 +109,7 @@ def _policies(metrics: Mapping[str, Any]) -> Table:
     for one in columns:
         table.add_column(one.heading, justify="right")
     for name, row in rows.items():
-        style = "" if name in REFERENCES else COLOURS[judged(rows, on_table, name).mood]
+        style = COLOURS[judged(rows, on_table, name).mood] if name in others(rows) else ""
         table.add_row(Text(name), *(Text(one.text(row), style) for one in columns))
     told = [f"{name}: {row.get('how', 'not recorded in this version')}." for name, row in rows.items()]
     told += explained(columns, metrics)
@@ -116,6 +117,7 @@ def _policies(metrics: Mapping[str, Any]) -> Table:
         told.append(f"There is no score: {no_score(metrics)}.")
     lines = [" ".join(told), *([f"table: {_table(on_table)}"] if on_table is not None else [])]
     lines.append(f"judged: {judgements(rows, on_table)}{_of_training(metrics)}")
+    lines += filter(None, [copied_told(metrics, config.get("eval_episodes", 0))])
     table.caption = Text("\n".join(lines), "table.caption")
     table.caption_justify = "left"
     return table

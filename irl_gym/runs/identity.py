@@ -37,7 +37,7 @@ NUMBER = 1
 FORMAT = f"irl_gym.Run/{NUMBER}"
 FIRST = ("expert", "demonstrations", "reward", "agent", "metrics", "figures")
 """Stages of every version, after the table."""
-STAGES = (*FIRST, "record", "ambiguity", "report")
+STAGES = (*FIRST[:4], "clone", *FIRST[4:], "record", "ambiguity", "report")
 """All stages after the table."""
 VERSION, ENVIRONMENT = "run.json", "environment.json"
 SWITCHES = {"--shaping": "--no-shaping"}

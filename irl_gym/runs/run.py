@@ -65,8 +65,8 @@ class Run(Record):
     expert: np.ndarray | None
     """(S,) actions, or (S, A) probabilities with rows of NaN where nothing is known; None where there is no table."""
     agents: Mapping[str, np.ndarray]
-    """(S,) actions, or (S, A), of the retrained agent and the learner's own policy, by their names in metrics.json; none
-    without a table."""
+    """(S,) actions, or (S, A), of the retrained agent, the learner's own policy and the clone, by their names in metrics.json;
+    none without a table."""
     certificate: Mapping[str, Any]
     """The content of certificate.json; where `recomputed`, its optimality is not the record's but of these files."""
     metrics: Mapping[str, Any]
@@ -185,7 +185,7 @@ def read_run(path: str | os.PathLike, table: Tabulation | None = None) -> Run:
         raise reader.incomplete(f"{what}; delete {ENVIRONMENT}, and it is written again")
     metrics, certificate = reader.read(METRICS, read_metrics), reader.read("certificate.json", read_certificate)
     there = {name for name in ("reward.npz", TABLE) if (path / name).exists()}
-    for fault in at_odds(stages["reward"], metrics, certificate, there):
+    for fault in at_odds(stages, metrics, certificate, there):
         raise reader.incomplete(fault)
     on_table, retrained = metrics.get("table") is not None, RETRAINED in metrics["policies"]
     judged = [name for name in FILES if on_table and name in metrics["policies"]]

@@ -18,13 +18,13 @@ from irl_gym.judging import measures
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.estimated import evidence_told
 from irl_gym.judging.measures import JudgedReward, measured
-from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED, Scale
+from irl_gym.judging.scores import CLONE, EXPERT, LEARNED, RANDOM, RETRAINED, Scale, in_order
 from irl_gym.judging.shares import GOOD
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import claims_in
 from irl_gym.tables.tabulation import Tabulation
 
-TOLD_STAGES = ("expert", "demonstrations", "reward", "agent")
+TOLD_STAGES = ("expert", "demonstrations", "reward", "agent", "clone")
 """The stages whose records are told."""
 NEARLY_ALL = 0.99
 """A score that the learning curve is reported to reach for good, beside `shares.GOOD`."""
@@ -63,18 +63,20 @@ def scorecard(
         "reward": reward_told(certificate) | learned_told(records["reward"]) | on_table,
         "training": {**training_told(records["agent"]), **settled(curve, scale)},
         "table": None if table is None else table_told(table, horizon),
-        "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"]),
+        "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"])
+        | cloned_told(records["clone"]),
     }  # fmt: skip
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
-    """The content of metrics.json; what a terminal would obey in its names and texts is spelled out.
+    """The content of metrics.json, its policies in order; what a terminal would obey in its names and texts is spelled out.
 
     Raises:
         OSError: it cannot be read now.
         DamagedFile: it is something else.
     """
-    return in_lines(read_json(path, Metrics))
+    told = in_lines(read_json(path, Metrics))
+    return {**told, "policies": in_order(told["policies"])}
 
 
 def scale_told(scale: Scale) -> dict[str, Any]:
@@ -101,6 +103,11 @@ def trained_told(record: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in record.items() if key in TRAINED}
 
 
+def cloned_told(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Why the demonstrations could not be copied, from that stage's record."""
+    return {"no_clone": record["no_clone"]} if "no_clone" in record else {}
+
+
 def training_told(record: Mapping[str, Any]) -> dict[str, Any]:
     """What is told of the agent's training, from its stage's record: its steps, and where it did not go on as in one go."""
     resumed = {"resumed_at": record["resumed_at"]} if "resumed_at" in record else {}
@@ -125,13 +132,15 @@ def outcome_of(learner: Any) -> str:
 
 def came_about(config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """How each of the loop's policies came about, by its configuration and the records of its stages."""
-    made, learned, trained = (stages[name].get("how", NOT_RECORDED) for name in ("expert", "reward", "agent"))
+    names = ("expert", "clone", "reward", "agent")
+    made, cloned, learned, trained = (stages.get(name, {}).get("how", NOT_RECORDED) for name in names)
     n = stages["demonstrations"].get("episodes")
     noise = f", with a random action at probability {config['epsilon']:g}" if config.get("epsilon") else ""
     given = config.get("dataset") is not None
     return {
         EXPERT: f"known by {n:,} episode{'s' * (n != 1)} of the dataset" if given else f"{made}{noise}",
         RANDOM: "uniformly random actions",
+        CLONE: cloned,
         LEARNED: learned,
         RETRAINED: trained,
     }

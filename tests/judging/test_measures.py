@@ -96,7 +96,9 @@ def test_a_measure_that_is_added_has_its_number_of_each_policy_that_it_is_asked_
     run, *_ = measured
     rows = run.metrics["policies"]
     assert all(row["twice"] == 2 * row["value"] for row in rows.values())
-    assert [name for name, row in rows.items() if "length" in row] == ["retrained"] and rows["retrained"]["length"] >= 1
+    assert [name for name, row in rows.items() if "length" in row] == ["clone", "retrained"] and rows["retrained"][
+        "length"
+    ] >= 1
     assert run.metrics["reward"]["least"] == run.tabular.values.min()
 
 
@@ -140,6 +142,7 @@ def four(finished, tmp_path_factory):
     world = TableWorld(gym.make("FrozenLake-v1", **LAKE["env_kwargs"]), run.table, 16, 0)
     how = {name: row["how"] for name, row in run.metrics["policies"].items()}
     made = {"expert": run.expert, "random": world.random, "retrained": run.agent, "cloned": np.zeros_like(run.expert)}
+    made["clone"] = run.agents["clone"]
     rows, _ = evaluate(
         {name: (policy, how.get(name, "cloned from 3 episodes")) for name, policy in made.items()}, world, run.table, None,
         given=None, episodes_only=False, episodes=LAKE["eval_episodes"], seed=0,
@@ -179,7 +182,8 @@ def test_a_run_with_a_fourth_policy_is_read_with_it(four, copied):
 def test_how_a_policy_came_about_follows_from_the_stages(finished):
     rows = read_run(finished).metrics["policies"]
     assert {name: row["how"] for name, row in rows.items()} == {
-        "expert": "planned by value iteration", "random": "uniformly random actions", "retrained": "trained by PPO"
+        "expert": "planned by value iteration", "random": "uniformly random actions", "retrained": "trained by PPO",
+        "clone": "cloned from 60 steps; 5 of 11 states never seen; the learner had the expert's whole policy",
     }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from irl_gym.tables.tabulate import tabulate
 
 FILES = (
     "config.json", "expert.npz", "reward.npz", "reward_shaped.npz", "certificate.json", "agent.zip", "agent_policy.npz",
-    "learning_curve.csv", "metrics.json",
+    "clone_policy.npz", "learning_curve.csv", "metrics.json",
     "figures/rewards.png", "figures/values.png", "figures/policies.png", "figures/learning_curve.png",
 )  # fmt: skip
 SMALL = {"episodes": 20, "eval_episodes": 20, "num_envs": 16, "env_kwargs": {"is_slippery": False}}
@@ -169,6 +169,7 @@ def test_progress_reaches_the_end_of_each_stage(planned):
         "demonstrations",
         "reward",
         "agent",
+        "clone",
         "metrics",
         "figures",
         "record",

@@ -218,7 +218,7 @@ def test_an_expert_without_recorded_rewards_is_paid_by_the_table(source, from_da
 
 def test_there_is_no_score_when_the_expert_earns_no_more_than_random_actions(source, tmp_path):
     report = without_rewards(source, tmp_path, lambda n: min(n - 1, 2))
-    assert [row["score"] for row in report.metrics["policies"].values()] == [None] * 3
+    assert [row["score"] for row in report.metrics["policies"].values()] == [None] * 4
     assert report.metrics["reward"]["worst_tie_regret_share"] is None
     console = Console(file=io.StringIO(), width=200)
     print_report(report, console)
@@ -226,7 +226,7 @@ def test_there_is_no_score_when_the_expert_earns_no_more_than_random_actions(sou
 
 
 def test_two_episodes_make_no_score_and_the_metrics_say_why(two):
-    assert [row["score"] for row in two.metrics["policies"].values()] == [None] * 3
+    assert [row["score"] for row in two.metrics["policies"].values()] == [None] * 4
     assert two.metrics["expert_value"] == {"episodes": 2, "low": None, "high": None}
     assert "the mean of 2 episodes, too few" in two.metrics["score_reason"]
     assert two.metrics["reward"]["worst_tie_regret_share"] is None

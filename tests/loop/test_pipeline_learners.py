@@ -105,7 +105,7 @@ def test_a_run_of_cells_is_read_without_making_its_environment(runs, monkeypatch
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_run_leaves_its_files(runs, name):
-    agent = {"agent.zip"} if name in STEPPED else {"agent_policy.npz"}
+    agent = {"agent.zip", "clone.zip"} if name in STEPPED else {"agent_policy.npz", "clone_policy.npz"}
     expert = set() if name in STEPPED and name in DATA else {"expert.zip"} if name in STEPPED else {"expert.npz"}
     left = {path.name for path in runs(name).out.iterdir()}
     assert {
@@ -130,7 +130,8 @@ def test_a_run_draws_its_figures(runs, name):
 def test_the_metrics_have_the_documented_keys(runs, name):
     metrics = runs(name).metrics
     assert set(metrics) == {"policies", "score_reason", "expert_value", "reward", "training", "demonstrations", "table"}
-    assert set(metrics["policies"]) == {"expert", "random", "retrained", *(["learned"] if name in TRAJECTORIES else [])}
+    own = {"learned"} if name in TRAJECTORIES else set()
+    assert set(metrics["policies"]) == {"expert", "random", "clone", "retrained"} | own
     row = {"how", "value", "score", "mean_return", "return_low", "return_high", "return_share", "agreement"}
     assert all(set(one) == row for one in metrics["policies"].values())
     assert (metrics["table"] is None) == (name in STEPPED) and metrics["demonstrations"]["given"] == (name in DATA)

@@ -95,7 +95,7 @@ def test_a_run_whose_folder_is_a_link_is_continued(finished, tmp_path):
     assert recover_and_retrain(asked(), tmp_path / "link").stages["agent"]["kept"]
 
 
-STAGES = ("expert", "demonstrations", "reward", "agent", "metrics", "figures", "record", "ambiguity", "report")
+STAGES = ("expert", "demonstrations", "reward", "agent", "clone", "metrics", "figures", "record", "ambiguity", "report")
 
 
 @pytest.mark.parametrize("stage", ["expert", "agent", "record", "report"])

@@ -26,6 +26,9 @@ def test_a_learner_that_asks_goes_through_the_loop_and_its_reports(run, script, 
     assert done.returncode == 0 and "asked 110 times, in 11 states, over 10 rounds" in told, done.stderr
     policies = read_json(tmp_path / "run/metrics.json")["policies"]
     assert policies["learned"]["value"] == policies["expert"]["value"]
+    assert policies["clone"]["how"].startswith("cloned from ") and policies["clone"]["how"].endswith(
+        "; the learner could ask the expert"
+    )
     assert script("report", "--run", "run", cwd=tmp_path).returncode == 0
     assert script("doctor", "--run", "run", cwd=tmp_path).returncode == 3  # no reward to examine
     shutil.copytree(tmp_path / "run", tmp_path / "again")

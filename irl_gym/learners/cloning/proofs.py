@@ -45,6 +45,12 @@ class CloneProof:
     least_log_loss: float
     """That no policy is below."""
 
+    @property
+    def brief(self) -> str:
+        """How the clone came about, in a few words."""
+        never = f"{self.unshown:,} of {counted(self.acting, 'state')} never seen"
+        return f"cloned from {self.steps:,.0f} steps; {never if self.unshown else 'every state was seen'}"
+
     def facts(self) -> tuple[Fact, ...]:
         """What was shown, where nothing was, and how the steps that were shown are imitated."""
         where = "states to act in that can be reached" if self.on_table else "states that there are numbers for"

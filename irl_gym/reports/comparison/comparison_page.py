@@ -13,9 +13,10 @@ from typing import Any
 from irl_gym.errors import InvalidParameter
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging import measures
+from irl_gym.judging.copied import copied
 from irl_gym.judging.diagnoses.findings import told_answer
 from irl_gym.judging.measures import Measure, explained, shown
-from irl_gym.judging.scores import REFERENCES, agent_of, called, others
+from irl_gym.judging.scores import REFERENCES, agent_of, called, others, scored
 from irl_gym.judging.shares import judged
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.reports.comparison.compared_runs import ComparedRuns, lettered
@@ -71,7 +72,7 @@ def _page(compared_runs: ComparedRuns) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def results(
     metrics: Mapping[str, Mapping[str, Any]], stages: Mapping[str, Mapping[str, Mapping[str, Any]]],
-    recomputed: Mapping[str, bool], places: Mapping[str, str],
+    recomputed: Mapping[str, bool], places: Mapping[str, str], configs: Mapping[str, Mapping[str, Any]],
 ) -> Section:  # fmt: skip
     """One row a run."""
     told = shown(measures.POLICIES, [row for one in metrics.values() for row in one["policies"].values()])
@@ -79,6 +80,7 @@ def results(
         letter: {
             "environment": places[letter],
             **dict(_numbers(one, told, recomputed=recomputed[letter])),
+            **_copied(one, configs[letter]),
             "time of all stages": _time(stages[letter]),
         }
         for letter, one in metrics.items()
@@ -119,14 +121,14 @@ def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed:
         recomputed: was what it says of the expert under the reward computed from the run's files?
     """
     policies, reward = metrics["policies"], metrics["reward"]
-    agents = others(policies)
-    for one, name in product((one for one in told if one.relative), agents):
+    agents, rated = others(policies), scored(policies)
+    for one, name in product((one for one in told if one.relative), rated):
         yield f"{one.heading}, {called(name)}", one.text(policies[name])
     for name in agents:
         yield f"{called(name)}, judged by the worse share", judged(policies, metrics.get("table"), name).brief
-    for one, name in product((one for one in told if not one.relative), (*agents, *REFERENCES)):
+    for one, name in product((one for one in told if not one.relative), (*rated, *REFERENCES)):
         yield f"{one.heading}, {called(name)}", one.text(policies[name])
-    for name in (*agents, *REFERENCES):
+    for name in (*rated, *REFERENCES):
         yield f"how it came about, {called(name)}", how(policies[name])
     yield from ((one.heading, one.text(reward)) for one in shown(measures.REWARDS, [reward]))
     whose = "" if recomputed else ", as recorded"
@@ -135,6 +137,13 @@ def _numbers(metrics: Mapping[str, Any], told: Sequence[Measure], *, recomputed:
     if metrics["training"]["environment_steps"] and policies[agent_of(policies)]["score"] is not None:
         steps = metrics["training"].get("steps_to_0.99")
         yield "environment steps to a score of 0.99", "not reached" if steps is None else f"{steps:,}"
+
+
+def _copied(metrics: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, str]:
+    """Does copying the demonstrations do as well? Nothing where there is no clone."""
+    found = copied(metrics, config.get("eval_episodes", 0))
+    told = {"as well": "yes", "worse": "no"}
+    return {} if found is None else {"does copying the demonstrations do as well?": told.get(found, found)}
 
 
 def rewards(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from irl_gym.intervals import Interval
-from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, others, score_of, several
+from irl_gym.judging.scores import CALLED, EXPERT, RANDOM, score_of, scored, several
 from irl_gym.judging.scores import called as called_policy
 from irl_gym.reports.comparison.runs_as_rows import runs_as_rows
 from irl_gym.reports.page.sections.section import Section
@@ -47,7 +47,7 @@ def told(pool: Pool) -> str:
     means = f"score {spoken(pool.score)}, {returned(pool)}; {pool.judged.brief}"
     beside = [
         f"; {called_policy(name)}: score {spoken(pool.score_of(name))}, {pool.judged_of(name).brief}"
-        for name in others(pool.policies)
+        for name in scored(pool.policies)
         if name != pool.agent
     ]
     return f"{called(pool)}, {averaged(pool)} over {n} seeds: {means}{''.join(beside)}"
@@ -78,7 +78,7 @@ def _row(pool: Pool, places: Mapping[str, str]) -> dict[str, str]:
         "learner": str((config.get("learner") or {}).get("type", "")),
         "seeds": ", ".join(str(run.config["seed"]) for run in pool.runs.values()),
     }
-    for name in others(pool.policies):
+    for name in scored(pool.policies):
         told |= _of_policy(pool, name)
     ends = " and ".join(number(pool.mean_returns[name].estimate) for name in (RANDOM, EXPERT))
     told["mean return of random actions and of the expert"] = ends

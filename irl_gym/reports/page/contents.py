@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from irl_gym.judging.curves import Curve
+from irl_gym.judging.scores import others
 from irl_gym.reports.page.maps import Map
 from irl_gym.reports.page.scene import Scene
 from irl_gym.runs.films import Film
@@ -27,7 +28,8 @@ class RunContents:
             return None
         told = run.metrics.get("demonstrations", {})
         by_episodes = bool(told.get("episodes_only", False))
-        return Scene(run.table, run.tabular, run.expert, run.agents, run.actions, run.state_name, run.grid, by_episodes)
+        agents = {name: run.agents[name] for name in others(run.agents)}
+        return Scene(run.table, run.tabular, run.expert, agents, run.actions, run.state_name, run.grid, by_episodes)
 
     @property
     def place_name(self) -> Callable[[int, int | None], str]:

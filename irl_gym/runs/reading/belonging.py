@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.judging.scores import LEARNED, RETRAINED
+from irl_gym.judging.scores import CLONE, LEARNED, RETRAINED
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ExpectedAdvantage, ShapedReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -55,20 +55,25 @@ def strangers(
 
 
 def at_odds(
-    learned: Mapping[str, Any], metrics: Mapping[str, Any], certificate: Mapping[str, Any], there: Container[str]
+    stages: Mapping[str, Mapping[str, Any]], metrics: Mapping[str, Any], certificate: Mapping[str, Any], there: Container[str]
 ) -> Iterator[str]:
-    """Where records do not agree on what there is: a table, a reward, a policy of the learner's own.
+    """Where records do not agree on what there is: a table, a reward, a policy of the learner's own, a clone.
 
     Args:
-        learned: the record of the stage that learns.
+        stages: the record of each stage.
         metrics: the content of metrics.json.
         certificate: the content of certificate.json.
         there: the names of files that are.
     """
+    learned, copied = stages["reward"], stages.get("clone", {}).get("files")
     rewarded, mend = "reward.npz" in learned["files"], "delete metrics.json, and it is made again"
-    for what, name, found in (("reward", RETRAINED, rewarded), ("policy", LEARNED, learned.get("policy", False))):
+    for name, what, stage, found in (
+        (RETRAINED, "a reward was learned", "reward", rewarded),
+        (LEARNED, "a policy was learned", "reward", learned.get("policy", False)),
+        (CLONE, "there is a clone", "clone", bool(copied)),
+    ):
         if (name in metrics["policies"]) is not found:
-            yield f"metrics.json and .stages/reward.json do not agree on whether a {what} was learned; {mend}"
+            yield f"metrics.json and .stages/{stage}.json do not agree on whether {what}; {mend}"
     if metrics.get("table") is None:
         if "table.npz" in there:
             yield f"metrics.json tells of no table, and table.npz is there; {mend}"

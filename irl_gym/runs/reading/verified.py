@@ -20,7 +20,7 @@ from irl_gym.facts import in_lines
 from irl_gym.judging.curves import Curve
 from irl_gym.judging.evaluation import Candidate, good_actions, judge, scale_of
 from irl_gym.judging.metrics import policy_value
-from irl_gym.judging.scores import EXPERT, LEARNED, RANDOM, RETRAINED
+from irl_gym.judging.scores import CLONE, EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.judging.shares import returns_of, share_of_return
 from irl_gym.mdp.planning.dynamic_programming import optimum
 from irl_gym.mdp.rewards import TabularReward
@@ -29,6 +29,7 @@ from irl_gym.runs.reading.unfinished import seen_with_noise
 from irl_gym.runs.scorecard import (
     NOT_RECORDED,
     came_about,
+    cloned_told,
     judge_reward,
     known_by,
     learned_told,
@@ -47,7 +48,7 @@ WITHIN = 1e-6
 """Share of the largest value by which two computations of one value may differ."""
 MOST_STEPS = 100_000
 """Of a horizon that values are computed again for."""
-FILES = {RETRAINED: "agent_policy.npz", LEARNED: "learned_policy.npz"}
+FILES = {RETRAINED: "agent_policy.npz", LEARNED: "learned_policy.npz", CLONE: "clone_policy.npz"}
 """Where the policies of a table are that are judged by expert and random actions."""
 EVIDENCE = ("method", "counted", "error", "reward_error", "value_error", "errors", "hidden_state", "checked")
 """Of a table, what is told as table.npz has it now: another version may word or bound it otherwise."""
@@ -106,11 +107,13 @@ def claims(
     yield Claim("config.json", {"reward": learner, "demonstrations": known})
     shown = ".stages/demonstrations.json" if known["given"] else ".stages/expert.json"
     made = {EXPERT: shown, RANDOM: "config.json", LEARNED: ".stages/reward.json", RETRAINED: ".stages/agent.json"}
+    made |= {CLONE: ".stages/clone.json"}
     for name, how in came_about(config, stages).items():
         file = made[name]
         yield Claim(file, {"policies": {name: {"how": how}}})
     yield Claim(".stages/reward.json", {"reward": learned_told(stages["reward"])})
     yield Claim(".stages/demonstrations.json", {"demonstrations": shown_told(stages["demonstrations"])})
+    yield Claim(".stages/clone.json", {"demonstrations": cloned_told(stages.get("clone", {}))})
     yield Claim(".stages/agent.json", {"training": training_told(stages["agent"])})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
@@ -163,7 +166,7 @@ def again(
         metrics: the content of metrics.json.
         table: the run's.
         expert: (S,) actions or (S, A) probabilities. Of one that is known by its episodes the value is theirs, as recorded.
-        agents: the same of the retrained agent and of the learner's policy, by their names, where there is one.
+        agents: the same of the retrained agent, the learner's policy and the clone, by their names, where there is one.
         reward: the learned one, in the table; None of a learner of policies.
         curve: what the agent earned as it trained.
 

@@ -87,14 +87,19 @@ def test_the_expert_of_a_corridor_is_healthy_under_its_goal():
     assert names(judged(mdp, right(mdp), np.eye(6)[5]), mdp, right(mdp), true=np.eye(6)[5]) == ()
 
 
-def _judged(value, low, high):
+def _judged(value, low, high, name="expert"):
     told = {"sampled_value": (low + high) / 2, "sampled_low": low, "sampled_high": high}
-    rows = {"expert": {"value": value, **told}, "random": {"value": 0.0}, "retrained": {"value": value}}
+    rows = {"expert": {"value": value}, "random": {"value": 0.0}, "retrained": {"value": value}}
+    rows |= {name: {"value": value, **told}}
     return diagnose(Case(judged={"policies": rows}, claims={"gaps": []})).names
 
 
 def test_a_counted_table_that_episodes_do_not_confirm_is_told():
     assert "table-not-confirmed" in _judged(1.0, 0.7, 0.9)
+
+
+def test_the_clone_of_a_run_tells_the_doctor_nothing():
+    assert "table-not-confirmed" not in _judged(1.0, 0.7, 0.9, "clone")
 
 
 def test_a_counted_table_that_is_off_by_noise_is_not_told():

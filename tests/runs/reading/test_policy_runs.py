@@ -13,7 +13,7 @@ from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.policies import load_actions
 from irl_gym.runs.run import read_run
 
-ROWS = {"policy": ["expert", "learned", "random"], "both": ["expert", "learned", "random", "retrained"]}
+ROWS = {"policy": ["clone", "expert", "learned", "random"], "both": ["clone", "expert", "learned", "random", "retrained"]}
 
 
 @pytest.fixture

@@ -150,6 +150,14 @@ def test_metrics_that_hide_the_reward_are_refused_and_made_again(finished, unvou
     assert read_run(unvouched).metrics == read_run(finished).metrics
 
 
+def test_metrics_that_hide_the_clone_are_refused(unvouched):
+    told = read_json(unvouched / "metrics.json")
+    del told["policies"]["clone"]
+    write_json(unvouched / "metrics.json", told)
+    with pytest.raises(RunIncomplete, match=r"whether there is a clone; delete metrics\.json, and it is made again"):
+        read_run(unvouched)
+
+
 def test_metrics_that_hide_the_table_are_refused(unvouched):
     write_json(unvouched / "metrics.json", {**read_json(unvouched / "metrics.json"), "table": None})
     with pytest.raises(RunIncomplete, match=r"tells of no table, and table\.npz is there; delete metrics\.json"):
@@ -158,8 +166,8 @@ def test_metrics_that_hide_the_table_are_refused(unvouched):
 
 @pytest.mark.parametrize(("judged", "faults"), [({"expert_optimal": True}, 1), (None, 0)])
 def test_a_verdict_that_only_a_table_gives_is_refused_where_there_is_none(judged, faults):
-    learned = {"files": ["reward.npz"], "policy": False}
-    found = [*at_odds(learned, {"policies": {"retrained": {}}, "table": None}, {"optimality": judged}, {"reward.npz"})]
+    stages = {"reward": {"files": ["reward.npz"], "policy": False}}
+    found = [*at_odds(stages, {"policies": {"retrained": {}}, "table": None}, {"optimality": judged}, {"reward.npz"})]
     assert len(found) == faults and all("which only a table tells" in one for one in found)
 
 
@@ -189,7 +197,8 @@ EDITS = {
         "reward.degenerate": (True, r"certificate\.json"), "reward.violated_states": (3, r"certificate\.json"),
         "table.exact": (False, r"table\.npz"), "table.states": (17, r"table\.npz"), "table.horizon": (3, r"table\.npz"),
         "policies.random.value": (0.0, r"table\.npz"), "policies.expert.value": (2.0, r"expert\.npz"),
-        "policies.retrained.value": (0.9, r"agent_policy\.npz"),
+        "policies.retrained.value": (0.9, r"agent_policy\.npz"), "policies.clone.value": (0.9, r"clone_policy\.npz"),
+        "policies.clone.how": ("by hand", r"\.stages/clone\.json"),
     },
     "certificate.json": {
         "proof.terms.duality_gap": (0.5, r"certificate\.json"), "optimality.zero": (True, r"certificate\.json"),
@@ -228,15 +237,16 @@ def test_what_was_edited_is_refused_by_who_reads_and_who_continues_and_the_mend_
     assert read_run(copied).vouched and (copied / name).read_bytes() == (finished / name).read_bytes()
 
 
-def test_an_agent_that_was_swapped_is_named_and_made_again(copied, run):
-    other = 0 if run.metrics["policies"]["retrained"]["value"] else run.expert  # of another value
-    np.savez(copied / "agent_policy.npz", actions=np.zeros_like(run.expert) + other)
-    with pytest.raises(RunIncomplete, match=r"as agent_policy\.npz gives it; delete agent_policy\.npz and metrics\.json, and"):
+@pytest.mark.parametrize(("name", "file"), [("retrained", "agent_policy.npz"), ("clone", "clone_policy.npz")])
+def test_a_policy_that_was_swapped_is_named_and_made_again(copied, run, name, file):
+    other = 0 if run.metrics["policies"][name]["value"] else run.expert  # of another value
+    np.savez(copied / file, actions=np.zeros_like(run.expert) + other)
+    with pytest.raises(RunIncomplete, match=rf"as {file} gives it; delete {file} and metrics\.json, and"):
         read_run(with_digests_anew(copied))
-    for name in ("agent_policy.npz", "metrics.json"):
-        (copied / name).unlink()
+    for one in (file, "metrics.json"):
+        (copied / one).unlink()
     recover_and_retrain(asked(), copied)
-    assert np.array_equal(read_run(copied).agent, run.agent)
+    assert np.array_equal(read_run(copied).agents[name], run.agents[name])
 
 
 RECORDED = {"mean_return", "return_low", "return_high"}

@@ -11,6 +11,7 @@ from irl_gym.facts import Mood
 from irl_gym.intervals import TOO_FEW, Interval
 from irl_gym.judging import scores
 from irl_gym.judging.confirmation import loss_told
+from irl_gym.judging.copied import copied_told
 from irl_gym.judging.measures import no_score
 from irl_gym.judging.scores import EXPERT, RANDOM, RETRAINED, agent_of, others, score_of, the
 from irl_gym.judging.shares import GOOD, MUCH, WELL, as_well, judged, returns_of
@@ -36,7 +37,7 @@ class Told(NamedTuple):
 
 def verdict(
     metrics: Mapping[str, Any], certificate: Mapping[str, Any], diagnosis: Mapping[str, Any] | None, rewarded: bool,
-    recomputed: bool, whose: str,
+    recomputed: bool, whose: str, config: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     """What the run was about; two questions with their answers and figures; and whose word all of it is.
 
@@ -47,6 +48,7 @@ def verdict(
         rewarded: was a reward learned?
         recomputed: was what it says of the expert under the reward computed from the run's files?
         whose: whose word it is, what is said of the run.
+        config: the content of config.json.
     """
     agent, reward = _agent(metrics), metrics["reward"]
     who = scores.who(metrics["policies"])
@@ -54,7 +56,7 @@ def verdict(
     questions = [
         {
             "question": as_well(metrics["policies"]),
-            **_well(metrics)._asdict(),
+            **_well(metrics, config)._asdict(),
             "figures": _earned(metrics, agent, who),
         },
         {
@@ -79,7 +81,7 @@ def _agent(metrics: Mapping[str, Any]) -> Mapping[str, Any]:
     return metrics["policies"][agent_of(metrics["policies"])]
 
 
-def _well(metrics: Mapping[str, Any]) -> Told:
+def _well(metrics: Mapping[str, Any], config: Mapping[str, Any]) -> Told:
     """Does the agent do as well as the expert?"""
     rows, agent = metrics["policies"], _agent(metrics)
     mood = judged(rows, metrics.get("table")).mood
@@ -91,7 +93,11 @@ def _well(metrics: Mapping[str, Any]) -> Told:
     agrees, told = agent.get("agreement"), metrics.get("demonstrations", {})
     taken = "an optimal action" if told.get("episodes_only") else "one of the expert's actions, or another that is as good,"
     acts = "" if agrees is None else f"It takes {taken} in {percent(agrees)} of the states."
-    return Told(WELL[mood], mood, (earns, score, acts, _beside(metrics), _counted(metrics, agent)))
+    return Told(
+        WELL[mood],
+        mood,
+        (earns, score, acts, _beside(metrics), copied_told(metrics, config.get("eval_episodes", 0)), _counted(metrics, agent)),
+    )
 
 
 def _earned(metrics: Mapping[str, Any], agent: Mapping[str, Any], who: str) -> list[dict[str, Any]]:

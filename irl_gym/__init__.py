@@ -30,8 +30,15 @@ _found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str):
     if name in __all__ or name.startswith("_"):
         return _found(name)
+    import sys
     from difflib import get_close_matches
+    from importlib.util import find_spec
 
     near = get_close_matches(name.lower(), by_lower := {one.lower(): one for one in __all__}, n=1)
     mend = f" Use irl_gym.{by_lower[near[0]]}." if near else " `help(irl_gym)` lists them."
-    raise AttributeError(f"irl_gym has no {name}: expected one of its names.{mend}")
+    told = f"irl_gym has no {name}: expected one of its names.{mend}"
+    # `from irl_gym import name` asks first whether the name is there, and says nothing but its own words to an AttributeError
+    imported = sys._getframe(1).f_code.co_name == "_handle_fromlist"
+    if near and imported and find_spec(f"irl_gym.{name}") is None:
+        raise ImportError(told, name=__name__)
+    raise AttributeError(told)

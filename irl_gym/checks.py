@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from gymnasium import spaces
 
-from irl_gym.errors import InvalidInput, InvalidParameter, IrlGymError, NotDiscrete
+from irl_gym.errors import InvalidInput, InvalidParameter, IrlGymError, NotDiscrete, a_type
 
 LARGEST = 1e300
 """Sums of larger numbers overflow."""
@@ -173,9 +173,7 @@ def float_array(name: str, value: Any, expected: str, error: type[InvalidInput])
             raise TypeError("complex numbers")  # NumPy would drop the imaginary part
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError, RecursionError) as reason:  # 10**400, a list within itself
-        raise error(
-            f"{name} is {type(value).__name__} that cannot be read as numbers ({reason}): expected {expected}."
-        ) from reason
+        raise error(f"{name} is {a_type(value)} that cannot be read as numbers ({reason}): expected {expected}.") from reason
 
 
 def discrete_actions(

@@ -43,8 +43,10 @@ IrlGymError
 A message reads `what, with the value: what was expected. The mend.`
 """
 
+import re
 from collections.abc import Collection
 from difflib import get_close_matches
+from typing import Any
 
 
 class IrlGymError(Exception):
@@ -207,3 +209,17 @@ def did_you_mean(name: str, known: Collection[str]) -> str:
     """What an error ends with that a mistyped name caused: the closest one as a question; nothing where none is close."""
     close = get_close_matches(name, known, 1, 0.5)
     return f" Did you mean {close[0]!r}?" if close else ""
+
+
+SPOKEN_AS_VOWEL = re.compile(r"(?!U[A-Z]|[Oo]ne|[Uu](?:int|ni(?!n|m)|se))[AEIOUaeiou]|[FHLMNRSX][A-Z0-9]|nd|rng")
+"""How a name begins that is spoken as a vowel: ndarray, MDPView and Episode, but not uint8, Unicode, URL and OneHot."""
+
+
+def with_article(name: str) -> str:
+    """A name of a type with its article, as it is spoken: a list, an int, an ndarray."""
+    return f"{'an' if SPOKEN_AS_VOWEL.match(name) else 'a'} {name}"
+
+
+def a_type(value: Any) -> str:
+    """What a value is, in words that follow "is": an int, a list, None."""
+    return "None" if value is None else with_article(type(value).__name__)

@@ -1,5 +1,7 @@
 """What errors say of natural mistakes with the facade is executed, and serves."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -105,6 +107,23 @@ def test_a_solution_and_an_outcome_of_a_policy_stand_for_their_policy(call):
 def test_a_name_that_is_not_there_is_told_with_the_closest(wrong, right):
     with pytest.raises(AttributeError, match=rf"irl_gym has no {wrong}: expected one of its names\. Use irl_gym\.{right}\."):
         getattr(irl_gym, wrong)
+
+
+def imported(what):
+    """What a program without the tests' checks says that imports something of the facade."""
+    code = f"from irl_gym import *; from irl_gym import {what}; print(FeatureLP.__name__, {what})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    return (done.stdout + done.stderr).splitlines()[-1]
+
+
+def test_an_import_of_a_name_that_is_not_there_is_told_with_the_closest():
+    said = imported("FeatureLp")
+    assert said == "ImportError: irl_gym has no FeatureLp: expected one of its names. Use irl_gym.FeatureLP."
+    assert not hasattr(irl_gym, "FeatureLp")
+
+
+def test_a_module_is_imported_from_the_library_though_a_name_is_close_to_it():
+    assert imported("facts").startswith("FeatureLP <module 'irl_gym.facts'")
 
 
 def test_a_name_that_nothing_is_close_to_is_told_where_the_names_are():

@@ -27,7 +27,7 @@ from irl_gym.agents.noise import boltzmann, checked_count, checked_temperature
 from irl_gym.agents.planners import Agent, Algorithm, load_agent
 from irl_gym.agents.shown_observations import Training, read_statistics
 from irl_gym.checks import discrete_actions
-from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy, NotDiscrete
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy, NotDiscrete, a_type
 from irl_gym.files.archives import read_settings
 from irl_gym.mdp.policies import Policy, generator, load_actions
 from irl_gym.spaces.batches import batch_size, take
@@ -129,8 +129,7 @@ class SoftAgent:
         if not isinstance(self.agent, Agent) or not isinstance(self.agent.model, DQN | OnPolicyAlgorithm):
             held = self.agent.model if isinstance(self.agent, Agent) else self.agent
             raise InvalidParameter(
-                f"agent is a {type(held).__name__}: expected `Agent(model)` of PPO, A2C or DQN. For tables there is "
-                "`boltzmann`."
+                f"agent is {a_type(held)}: expected `Agent(model)` of PPO, A2C or DQN. For tables there is `boltzmann`."
             )
         _check_discrete(self.agent)
         checked_temperature(self.temperature)
@@ -168,7 +167,7 @@ class SoftAgent:
 
 def _categorical(distribution: Any) -> CategoricalDistribution:
     if not isinstance(distribution, CategoricalDistribution):
-        raise NotDiscrete(f"the agent draws from a {type(distribution).__name__}: expected a categorical distribution.")
+        raise NotDiscrete(f"the agent draws from {a_type(distribution)}: expected a categorical distribution.")
     return distribution
 
 

@@ -1,9 +1,13 @@
 """What was done by `irl_gym.agents.neural_clone`, and what is known of it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from irl_gym.facts import Fact, counted, plain
+
+Epoch = Callable[[int, float, float], None]
+"""Called after each epoch with its number from 1, the mean loss of its minibatches, and that of what is held out, or NaN."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 
 from irl_gym._typing import Actions, ActionSets, Matrix
 from irl_gym.checks import checked_number, float_array
-from irl_gym.errors import InvalidParameter, InvalidPolicy
+from irl_gym.errors import InvalidParameter, InvalidPolicy, a_type
 from irl_gym.mdp.planning.dynamic_programming import Reward, backup, checked_reward, policy_evaluation, tied
 from irl_gym.mdp.policies import NOISE, Policy, as_distribution, generator
 from irl_gym.mdp.tabular_mdp import TabularMDP
@@ -120,7 +120,7 @@ class Noisy:
     def __post_init__(self) -> None:
         if not isinstance(self.policy, Policy):
             raise InvalidParameter(
-                f"policy is a {type(self.policy).__name__}: expected one with `predict`. Use `noisy` for tables, and wrap a "
+                f"policy is {a_type(self.policy)}: expected one with `predict`. Use `noisy` for tables, and wrap a "
                 "function in `Acting`."
             )
         checked_epsilon(self.epsilon)

@@ -20,7 +20,7 @@ from irl_gym.environments.closing import close
 from irl_gym.environments.rewarded_vec_env import check_steppable, normalised, rewarded
 from irl_gym.environments.rollouts import maker_of, moments_of
 from irl_gym.environments.tabular_vec_env import TabularVecEnv, shows_rows
-from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular
+from irl_gym.errors import InvalidParameter, NotDiscrete, NotTabular, a_type
 from irl_gym.features.feature_maps import FeatureMap, checked_features, over_rows
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.policies import Policy, generator
@@ -60,9 +60,7 @@ class Simulator(Record):
         check_discount(self.gamma)
         checked_number("num_envs", self.num_envs, "a whole number of at least 1", least=1, whole=True)
         if not isinstance(self.env, gym.Env):
-            raise InvalidParameter(
-                f"env is a {type(self.env).__name__}: expected an environment, such as gymnasium.make gives."
-            )
+            raise InvalidParameter(f"env is {a_type(self.env)}: expected an environment, such as gymnasium.make gives.")
         if not isinstance(self.planner, Planner):
             raise InvalidParameter(f"planner is {self.planner!r}: expected one with `plan`, such as ValueIteration() or SB3().")
         discrete_actions(self.env.action_space, error=InvalidParameter)

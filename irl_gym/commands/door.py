@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from irl_gym.commands.terminal import checked_name, print_error
+from irl_gym.commands.terminal import STOPPED, checked_name, print_error
 from irl_gym.errors import InvalidParameter
 
 SUBCOMMANDS = {
@@ -50,7 +50,11 @@ def main(words: Sequence[str] | None = None) -> int:
         print_error(error)
         return 2
     find_modules_here()
-    return importlib.import_module(f"irl_gym.commands.{name}").command(rest)
+    try:
+        return importlib.import_module(f"irl_gym.commands.{name}").command(rest)
+    except KeyboardInterrupt:
+        print("Stopped.", file=sys.stderr)
+        return STOPPED
 
 
 def usage() -> str:

@@ -8,7 +8,8 @@ For example:
     irl-gym run --dataset irl_gym/taxi-v4-expert-v0 --dataset-root DIR --learner feature-lp
 """
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +20,7 @@ from rich.text import Text
 
 from irl_gym.commands.arguments import Arguments, parse_reveal, parse_seeds
 from irl_gym.commands.learning_arguments import Learning, for_help
-from irl_gym.commands.terminal import exit_code, print_error, read_arguments, stage_bars
+from irl_gym.commands.terminal import STOPPED, Show, exit_code, print_error, read_arguments, stage_bars
 from irl_gym.errors import InvalidParameter, IrlGymError, RunConflict
 from irl_gym.runs.choices import PROGRAM
 
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 OTHERS = "the environment or of a learner of your own"
 """Whose code runs in a run besides."""
-STOPPED = 130
-"""What a process exits with that Ctrl-C ended."""
 
 
 def command(words: Sequence[str]) -> int:
@@ -51,13 +50,15 @@ def several(arguments: Arguments, words: Sequence[str]) -> int:
         arguments: with seeds.
         words: of the command line.
     """
-    from irl_gym.commands.compare import side_by_side
-    from irl_gym.runs.identity import without
-
     console = Console(soft_wrap=True)
     try:
         seeds = _seeds(arguments)
-        out = arguments.out or Path("runs") / _name(replace(arguments, seed=seeds[0]))
+        with _loading() as show:
+            from irl_gym.commands.compare import side_by_side
+            from irl_gym.runs.identity import without
+
+            out = arguments.out or Path("runs") / _name(replace(arguments, seed=seeds[0]))
+            show("loading", 1.0)
         if (out / "config.json").exists():
             raise RunConflict(f"{out} holds a run: expected a folder for one run a seed. Choose another --out.")
     except (IrlGymError, OSError) as error:
@@ -99,8 +100,7 @@ def _told(arguments: Arguments, command: Sequence[str], shared: Path, *, quiet: 
     """
     console = Console(soft_wrap=True) if quiet else Console()
     try:
-        with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the report is piped
-            show("loading", None)  # what is imported next takes seconds
+        with _loading() as show:
             from irl_gym.judging.shares import judgements
             from irl_gym.loop.pipeline import recover_and_retrain
             from irl_gym.reports.terminal_report import print_report
@@ -122,6 +122,14 @@ def _told(arguments: Arguments, command: Sequence[str], shared: Path, *, quiet: 
         print_error(error)
         return 2
     return 0
+
+
+@contextlib.contextmanager
+def _loading() -> Iterator[Show]:
+    """How far each stage is, of which the first is told before anything is imported that takes seconds."""
+    with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the report is piped
+        show("loading", None)
+        yield show
 
 
 def _kept(arguments: Arguments, shared: Path) -> "tuple[Experiment, Path]":

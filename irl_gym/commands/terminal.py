@@ -217,6 +217,8 @@ def print_error(error: Exception) -> None:
 
 DEFECT = 70
 """What a script exits with that stumbled over a defect, of irl_gym or of code of the user's own: EX_SOFTWARE of sysexits.h."""
+STOPPED = 130
+"""What a process exits with that Ctrl-C ended."""
 OURS = ("irl_gym", "irl_gym_envs")
 """Packages whose code is no user's own."""
 INSTALLED = ("site-packages", "dist-packages")

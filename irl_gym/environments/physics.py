@@ -18,7 +18,7 @@ from gymnasium.wrappers import DiscretizeAction, TransformAction
 from irl_gym._typing import Choices, Flags, Numbers, Points
 from irl_gym.checks import discrete_actions
 from irl_gym.environments.watching_wrappers import only_watches
-from irl_gym.errors import InvalidParameter, NotSettable
+from irl_gym.errors import InvalidParameter, NotSettable, a_type
 from irl_gym.spaces.coordinates import Coordinates, coordinates_of
 
 
@@ -71,7 +71,7 @@ def physics_of(env: gym.Env, *, bounds: Mapping[str, Sequence[float]] | None = N
         InvalidParameter: no environment, or bounds that are unknown, wrong or missing.
     """
     if not isinstance(env, gym.Env):
-        raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment, such as gymnasium.make gives.")
+        raise InvalidParameter(f"env is {a_type(env)}: expected an environment, such as gymnasium.make gives.")
     actions = _actions(env)
     offered = getattr(env.unwrapped, "physics", None)
     if isinstance(offered, Physics):

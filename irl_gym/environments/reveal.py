@@ -25,7 +25,7 @@ from gymnasium.envs.toy_text.blackjack import BlackjackEnv, is_natural
 from gymnasium.envs.toy_text.taxi import TaxiEnv
 
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidParameter, UnknownObservation
+from irl_gym.errors import InvalidParameter, UnknownObservation, a_type
 
 ABSENT = object()
 OBSERVATION = "observation"
@@ -114,9 +114,7 @@ def _number(name: str, value: Any, n: int) -> int:
             mend = f"Show the parts of it, as in {f'{name}[{parts}]'!r}"
         else:
             mend = "Give the environment an integer attribute that says the same, and show that"
-        raise InvalidParameter(
-            f"{name} is {str(value)[:90]}, a {type(value).__name__}: expected an integer or a boolean. {mend}."
-        )
+        raise InvalidParameter(f"{name} is {str(value)[:90]}, {a_type(value)}: expected an integer or a boolean. {mend}.")
     number = int(value)
     if not 0 <= number < n:
         listed = f"List its values, as in shown={{{name!r}: {list(range(number, n))[:99]}}}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import float_array
-from irl_gym.errors import InvalidFeatures, InvalidReward
+from irl_gym.errors import InvalidFeatures, InvalidReward, a_type
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.features.feature_maps import (
     FeatureMap,
@@ -176,7 +176,7 @@ def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     raise InvalidFeatures(
-        f"{name} is a {type(value).__name__}, code that no file can hold: expected one of {', '.join(_KINDS)}. Save "
+        f"{name} is {a_type(value)}, code that no file can hold: expected one of {', '.join(_KINDS)}. Save "
         "`reward.tabular(states)`, the same reward in a table."
     )
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.errors import a_type
+
 MOST_BYTES = 8 << 20
 """Of a pickle that is read."""
 
@@ -158,7 +160,7 @@ def _dictionary(flat: list[Any]) -> dict[Any, Any]:
     """Keys and values in turn. Python hashes a tuple by hashing what it holds, however deep: so keys are plain."""
     for key in flat[::2]:
         if not all(isinstance(one, _KEYS) for one in (key if isinstance(key, tuple) else (key,))):
-            raise ValueError(f"it has a dictionary with a {type(key).__name__} as a key")
+            raise ValueError(f"it has a dictionary with {a_type(key)} as a key")
     return dict(zip(flat[::2], flat[1::2], strict=True))
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from irl_gym.errors import InvalidParameter, InvalidReward
+from irl_gym.errors import InvalidParameter, InvalidReward, a_type
 from irl_gym.facts import Fact, Mood
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.learners.needs import Needs
@@ -63,11 +63,11 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
 
     def __post_init__(self) -> None:
         if not isinstance(self.reward, TabularReward | LinearReward | None):
-            raise InvalidReward(f"the reward is a {type(self.reward).__name__}: expected a TabularReward or a LinearReward.")
+            raise InvalidReward(f"the reward is {a_type(self.reward)}: expected a TabularReward or a LinearReward.")
         if not isinstance(self.status, Status):
             raise InvalidParameter(f"status is {self.status!r:.80}: expected a Status, such as Status.LEARNED.")
         if not isinstance(self.proof, Proof):
-            raise InvalidParameter(f"proof is a {type(self.proof).__name__}: expected `facts()` and `to_json()`.")
+            raise InvalidParameter(f"proof is {a_type(self.proof)}: expected `facts()` and `to_json()`.")
         if not isinstance(self.stats, Mapping):
             raise InvalidParameter(f"stats is {self.stats!r:.80}: expected notes by name.")
         if isinstance(self.policy, type):

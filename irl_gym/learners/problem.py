@@ -24,7 +24,7 @@ from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.demonstrated import most_frequent, visits
 from irl_gym.environments.generative import GenerativeModel
-from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, MissingPart
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, MissingPart, a_type
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, empirical_policy
@@ -69,7 +69,7 @@ class Oracle:
     def __init__(self, policy: Policy | Callable[[Any, Mapping[str, Any]], Any], deterministic: bool = True):
         if not isinstance(policy, Policy) and not callable(policy):
             raise InvalidParameter(
-                f"the oracle's policy is a {type(policy).__name__}: expected one with `predict`, or a function (observation, "
+                f"the oracle's policy is {a_type(policy)}: expected one with `predict`, or a function (observation, "
                 "info) -> action. A table of actions is one as `TabularPolicy(actions, states)`."
             )
         self.policy, self.deterministic, self.queries = policy, deterministic, 0
@@ -150,10 +150,10 @@ class Problem(Record):
     def __post_init__(self) -> None:
         if not isinstance(self.dynamics, TabularMDP | GenerativeModel | None):
             what = "a TabularMDP or a GenerativeModel, or None; of a Tabulation its `mdp`"
-            raise InvalidMDP(f"dynamics is a {type(self.dynamics).__name__}: expected {what}.")
+            raise InvalidMDP(f"dynamics is {a_type(self.dynamics)}: expected {what}.")
         if not isinstance(self.environment, World | None):
             what = "a world that can be run and solved, such as Simulator(env, SB3(), gamma)"
-            raise InvalidParameter(f"environment is a {type(self.environment).__name__}: expected {what}.")
+            raise InvalidParameter(f"environment is {a_type(self.environment)}: expected {what}.")
         if self.gamma is not None:
             check_discount(self.gamma)
         told = {name: value.gamma for name in ("dynamics", "environment") if (value := getattr(self, name)) is not None} | (

@@ -29,7 +29,7 @@ from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.facts import counted
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
 from irl_gym.files.run_folder import RunFolder
@@ -222,7 +222,7 @@ class Loop:
         learner = self.experiment.learner
         found: Any = learner.learn(self.problem, np.random.default_rng(self.experiment.seed))
         if not isinstance(found, Outcome):
-            raise InvalidParameter(f"{type(learner).__name__}.learn gave a {type(found).__name__}: expected an Outcome.")
+            raise InvalidParameter(f"{type(learner).__name__}.learn gave {a_type(found)}: expected an Outcome.")
         return found
 
     @cached_property

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from irl_gym.environments.reveal import shown_by
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.files.own_files import held
 from irl_gym.loop.loop import Loop
 from irl_gym.loop.stages import OnProgress
@@ -61,7 +61,7 @@ def recover_and_retrain(
     """
     if not isinstance(experiment, Experiment):
         raise InvalidParameter(
-            f"experiment is a {type(experiment).__name__}: expected an Experiment. Make one, such as "
+            f"experiment is {a_type(experiment)}: expected an Experiment. Make one, such as "
             "`irl_gym.Experiment('FrozenLake-v1', gamma=0.99)`."
         )
     with held(Path(out), f"another process works in {out}: wait for it, or choose another --out."):

@@ -25,7 +25,7 @@ from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.environments.closing import close
 from irl_gym.environments.rewarded_vec_env import check_steppable, rewarded
 from irl_gym.environments.rollouts import maker_of, run_episodes
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.run_folder import RunFolder, read_json, write_json
 from irl_gym.files.run_schema import Trained
@@ -140,7 +140,7 @@ class SteppedWorld:
         """
         if not isinstance(policy, Policy):
             raise InvalidParameter(
-                f"the policy is a {type(policy).__name__}: expected, where there is no table, one with `predict`. Wrap a "
+                f"the policy is {a_type(policy)}: expected, where there is no table, one with `predict`. Wrap a "
                 "function of observations in `irl_gym.agents.experts.Acting`."
             )
         return isinstance(policy, Agent)

@@ -14,7 +14,7 @@ import numpy as np
 
 from irl_gym._typing import Matrix, StateMask
 from irl_gym.checks import checked_number
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter, InvalidPolicy, UnknownObservation
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, InvalidPolicy, UnknownObservation, a_type
 from irl_gym.mdp.policies import Policy, as_distribution
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import TransitionTable
@@ -148,10 +148,10 @@ def collect(
     """
     _check_count(n_episodes, max_episode_steps)
     if not hasattr(env, "reset"):
-        raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment. It comes first, then the policy.")
+        raise InvalidParameter(f"env is {a_type(env)}: expected an environment. It comes first, then the policy.")
     if not hasattr(policy, "predict"):
         raise InvalidPolicy(
-            f"policy is a {type(policy).__name__}: expected one that acts on observations, with `predict`. Make one of a "
+            f"policy is {a_type(policy)}: expected one that acts on observations, with `predict`. Make one of a "
             "table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), "
             "table.states)`."
         )
@@ -270,14 +270,14 @@ def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int
         UnknownObservation: an observation that the index does not hold, naming the episode.
     """
     if not isinstance(states, States):
-        raise InvalidParameter(f"states is a {type(states).__name__}: expected a numbering. Give a table's, `table.states`.")
+        raise InvalidParameter(f"states is {a_type(states)}: expected a numbering. Give a table's, `table.states`.")
     checked_number("n_actions", n_actions, "a whole number of at least 1, such as `table.mdp.n_actions`", least=1, whole=True)
     counts = np.zeros((states.n_states, n_actions), dtype=np.int64)
     number = -1
     for number, episode in enumerate(episodes):
         if not isinstance(episode, Episode):
             raise InvalidDemonstrations(
-                f"episode {number} is a {type(episode).__name__}: expected an Episode. Read Minari datasets with "
+                f"episode {number} is {a_type(episode)}: expected an Episode. Read Minari datasets with "
                 "`read_minari(dataset)`, and other data with `irl_gym.demonstrations.imports`."
             )
         wrong = np.flatnonzero((episode.actions < 0) | (episode.actions >= n_actions))

@@ -16,7 +16,7 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Matrix
 from irl_gym.checks import any_array, checked_number, of_single_precision, shown_sum
-from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy
+from irl_gym.errors import DamagedFile, InvalidParameter, InvalidPolicy, a_type
 from irl_gym.files.archives import read_arrays
 from irl_gym.records import Record
 from irl_gym.spaces.states import States
@@ -101,7 +101,7 @@ def policy_array(policy: Any) -> np.ndarray:
     array = None if episodes else any_array("policy", policy, "one entry for each state", InvalidPolicy)
     if array is None or array.dtype == object:
         raise InvalidPolicy(
-            f"policy is a {type(policy).__name__}{' of episodes' * episodes}: expected a table, (S,) actions or (S, A) "
+            f"policy is {a_type(policy)}{' of episodes' * episodes}: expected a table, (S,) actions or (S, A) "
             f"probabilities. {_table_of(policy, first)}"
         )
     return array

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
 from irl_gym.checks import SUM_TOLERANCE, any_array, checked_number, float_array, of_single_precision, shown_sum, sparse_copy
-from irl_gym.errors import InvalidDiscount, InvalidMDP
+from irl_gym.errors import InvalidDiscount, InvalidMDP, a_type
 from irl_gym.mdp.policies import as_distribution, policy_array
 
 AS_GOOD_AS_EXACT = 10**9
@@ -171,9 +171,7 @@ def checked_mdp(mdp: Any) -> TabularMDP:
     if isinstance(mdp, TabularMDP):
         return mdp
     mend = "Give its `mdp`." if hasattr(mdp, "mdp") else "The mdp comes first, then the expert." if np.ndim(mdp) else ""
-    raise InvalidMDP(
-        f"mdp is a {type(mdp).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`. {mend}".strip()
-    )
+    raise InvalidMDP(f"mdp is {a_type(mdp)}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`. {mend}".strip())
 
 
 def check_discount(gamma: float) -> float:

@@ -12,7 +12,7 @@ from matplotlib.colors import CenteredNorm, Normalize
 from matplotlib.figure import Figure
 
 from irl_gym.checks import is_word
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.mdp.policies import as_distribution, completed, policy_array
 from irl_gym.mdp.rewards import RewardFunction, as_reward
@@ -58,7 +58,7 @@ def plot(
     """
     if not isinstance(env, gym.Env):
         raise InvalidParameter(
-            f"env is a {type(env).__name__}: expected an environment, whose map is drawn. Give a table besides, as `table`."
+            f"env is {a_type(env)}: expected an environment, whose map is drawn. Give a table besides, as `table`."
         )
     table = tabulate(env, gamma=ANY_GAMMA, check_steps=0) if table is None else table
     found, values = _told(what, kind, table)

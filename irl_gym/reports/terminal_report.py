@@ -40,13 +40,13 @@ def print_report(report: Report, console: Console) -> None:
 
 
 def render(report: Report) -> Iterator[RenderableType]:
-    """The parts of the report, in reading order."""
+    """The parts of the report, in reading order: a terminal shows the last ones, which are the verdict and what next."""
     out, metrics = report.out, report.metrics
     yield _asked(report.config, report.shown, out)
-    yield _policies(metrics, report.config)
-    yield from _lost(metrics["demonstrations"])
-    yield _reward(report.certificate, metrics)
     yield _stages(report.stages, metrics)
+    yield _reward(report.certificate, metrics)
+    yield _policies(metrics)
+    yield from _lost(metrics["demonstrations"])
     made = (
         "reward, certificate, agent, metrics, figures" if RETRAINED in metrics["policies"] else "certificate, policy, metrics"
     )
@@ -57,6 +57,9 @@ def render(report: Report) -> Iterator[RenderableType]:
     lost = report.stages.get("demonstrations", {}).get("no_environment")
     if lost:
         yield Text(harmless(lost))
+    yield _verdict(metrics["policies"], metrics)
+    if copied := copied_told(metrics, report.config.get("eval_episodes", 0)):
+        yield Text(harmless(copied))
     yield from _doctor(out, kept=bool(report.stages.get("ambiguity", {}).get("kept")))
     yield f"Open {report.page} in a browser."
 
@@ -101,7 +104,7 @@ def _recorded_in(out: Path) -> str:
     return f"{harmless(found)}, " if found else ""
 
 
-def _policies(metrics: Mapping[str, Any], config: Mapping[str, Any]) -> Table:
+def _policies(metrics: Mapping[str, Any]) -> Table:
     rows, on_table = metrics["policies"], metrics["table"]
     columns = shown(measures.POLICIES, list(rows.values()))
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
@@ -116,11 +119,15 @@ def _policies(metrics: Mapping[str, Any], config: Mapping[str, Any]) -> Table:
     if rows[EXPERT]["score"] is None:
         told.append(f"There is no score: {no_score(metrics)}.")
     lines = [" ".join(told), *([f"table: {_table(on_table)}"] if on_table is not None else [])]
-    lines.append(f"judged: {judgements(rows, on_table)}{_of_training(metrics)}")
-    lines += filter(None, [copied_told(metrics, config.get("eval_episodes", 0))])
     table.caption = Text("\n".join(lines), "table.caption")
     table.caption_justify = "left"
     return table
+
+
+def _verdict(rows: Mapping[str, Any], metrics: Mapping[str, Any]) -> Text:
+    """Does the agent do as well as the expert?"""
+    on_table = metrics["table"]
+    return Text(f"judged: {judgements(rows, on_table)}{_of_training(metrics)}", COLOURS[judged(rows, on_table).mood])
 
 
 def _of_training(metrics: Mapping[str, Any]) -> str:

@@ -30,6 +30,7 @@ from irl_gym.errors import (
     NotDiscrete,
     NotTabular,
     UnknownEnvironment,
+    a_type,
     did_you_mean,
 )
 from irl_gym.mdp.rewards import TabularReward
@@ -98,7 +99,7 @@ def tabulate(
     """
     check_discount(gamma)
     if not isinstance(env, gym.Env):
-        raise InvalidParameter(f"env is a {type(env).__name__}: expected an environment, such as gymnasium.make gives.")
+        raise InvalidParameter(f"env is {a_type(env)}: expected an environment, such as gymnasium.make gives.")
     for name, value in (("check_steps", check_steps), ("seed", seed)):
         checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
     discrete_actions(env.action_space)

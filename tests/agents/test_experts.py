@@ -127,7 +127,7 @@ def test_a_soft_agent_draws_the_same_alone_as_in_a_batch_and_when_deterministic(
 
 
 def test_a_soft_agent_refuses_a_table(unchecked):
-    with pytest.raises(InvalidParameter, match="agent is a ndarray: expected `Agent"):
+    with pytest.raises(InvalidParameter, match="agent is an ndarray: expected `Agent"):
         SoftAgent(np.eye(3), 1.0)
 
 

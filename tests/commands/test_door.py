@@ -75,6 +75,12 @@ def test_help_and_mistyped_options_load_nothing_heavy():
     assert "irl_gym" in loaded and HEAVY & {*loaded} == set() and done.stdout.count("usage: ") == len(door.SUBCOMMANDS)
 
 
+def test_the_table_of_learners_loads_nothing_that_trains_or_draws():
+    code = "import sys; from irl_gym.commands.door import main; main(['learners']); print(*{*sys.modules})"
+    loaded = {one.partition(".")[0] for one in process("-c", code).stdout.splitlines()[-1].split()}
+    assert "irl_gym" in loaded and (HEAVY - {"cvxpy", "scipy"}) & loaded == set()
+
+
 def test_the_console_script_is_the_door():
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
     point = importlib.metadata.EntryPoint("irl-gym", scripts["irl-gym"], "console_scripts")
@@ -85,6 +91,15 @@ def test_help_names_every_subcommand(irl_gym):
     done = irl_gym("--help")
     assert done.code == 0 and [name for name in door.SUBCOMMANDS if f"\n  {name} " not in done.out] == []
     assert irl_gym().out == irl_gym("help").out == done.out
+
+
+def test_ctrl_c_ends_any_subcommand_without_a_traceback(irl_gym, monkeypatch):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("irl_gym.commands.doctor.command", stopped)
+    done = irl_gym("doctor", "anything")
+    assert (done.code, done.out, done.errors) == (130, "", "Stopped.\n")
 
 
 def test_the_version_is_told(irl_gym):

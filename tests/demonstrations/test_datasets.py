@@ -15,7 +15,6 @@ from irl_gym.demonstrations.recorded import recorded_environment
 from irl_gym.errors import (
     DatasetExists,
     DatasetMismatch,
-    DatasetMissing,
     InvalidDemonstrations,
     InvalidParameter,
     NotDiscrete,
@@ -141,29 +140,6 @@ def test_continuous_actions_are_refused(tmp_path):
         minari.create_dataset_from_buffers("pendulum-v0", [one], env=env)
     with pytest.raises(NotDiscrete, match="Box"):
         next(iter(read_minari("pendulum-v0", root=tmp_path)))
-
-
-def test_an_unknown_id_is_a_missing_file(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        next(iter(read_minari("nothing-v0", root=tmp_path)))
-
-
-def test_a_missing_dataset_names_those_that_are_there_and_no_folder_whose_name_is_no_id(root):
-    for name in ("odd name", "me/no-version", "."):
-        (root / name / "data").mkdir(parents=True)
-    with pytest.raises(DatasetMissing, match=f"'nothing-v0' is not under .* Name one of these: {ID};"):
-        load_minari("nothing-v0", root=root)
-
-
-def test_a_missing_dataset_says_when_there_is_none(tmp_path):
-    with pytest.raises(DatasetMissing, match=r"There is none: name the root folder .*, or set MINARI_DATASETS_PATH"):
-        load_minari("nothing-v0", root=tmp_path)
-
-
-@pytest.mark.parametrize("wrong", ["no-version", "bad name-v0", ""])
-def test_a_malformed_id_is_not_looked_for(tmp_path, wrong):
-    with pytest.raises(InvalidParameter, match="malformed"):
-        load_minari(wrong, root=tmp_path)
 
 
 def test_load_minari_opens_what_was_written(root, env):

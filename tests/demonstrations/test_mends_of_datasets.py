@@ -4,20 +4,17 @@ import json
 import re
 import shutil
 import sys
-from types import SimpleNamespace
 
 import gymnasium as gym
 import h5py
 import minari
 import numpy as np
 import pytest
-from enumeration_envs import Board
 from gymnasium import spaces
 from gymnasium.wrappers import TransformObservation
 from mended import named
 
 import irl_gym.demonstrations.recorded
-from irl_gym.agents.expert_files import check_agent
 from irl_gym.demonstrations.datasets import load_minari, minari_root, read_minari, write_minari
 from irl_gym.demonstrations.endings import in_table
 from irl_gym.demonstrations.imports import from_arrays
@@ -25,9 +22,7 @@ from irl_gym.demonstrations.minari_formats import LONGEST_ARROW
 from irl_gym.errors import IrlGymError
 from irl_gym.mdp.episodes import Episode, empirical_policy
 from irl_gym.runs.named_parts import environment_of
-from irl_gym.spaces.listed_states import ListedStates
 from irl_gym.spaces.states import StateIndex
-from irl_gym.tables.counted.counting import Interaction
 from irl_gym.tables.tabulate import tabulate
 
 ID = "me/lake-v0"
@@ -153,10 +148,6 @@ LONG = one([0] * (LONGEST_ARROW + 1), [0] * LONGEST_ARROW)
 IN_AN_END = [one([0, 4, 5, 5], [1, 2, 2])]
 
 
-def agent(n):
-    return SimpleNamespace(observation_space=spaces.Discrete(n), model=SimpleNamespace(action_space=spaces.Discrete(4)))
-
-
 def lacks_a_package(root):
     gym.register("Late-v0", entry_point="late_package:Drawn")
     recorded_in(root, id="Late-v0", kwargs={})
@@ -166,10 +157,6 @@ def lacks_a_package(root):
 def installed(root):
     sys.modules["late_package"] = sys.modules[__name__]
     return read(root, env=environment_of(None, {}, ID, str(root)))
-
-
-def counted(steps):
-    return tabulate(Board(4), gamma=0.9, by=Interaction(steps)).states.encode(np.array([2, 2])) > 0
 
 
 CASES = [
@@ -235,12 +222,7 @@ CASES = [
     ("Pass after_end='cut' (--after-end cut) to end the episode there.",
      lambda _: list(in_table(IN_AN_END, TABLE.mdp, TABLE.states, "refuse")),
      lambda _: list(in_table(IN_AN_END, TABLE.mdp, TABLE.states, "cut"))),
-    # listed_states, demonstrations
-    ("Sort them, each once.",
-     lambda _: ListedStates(spaces.Discrete(16), np.array([[4], [0], [4]])),
-     lambda _: ListedStates(spaces.Discrete(16), np.unique([[4], [0], [4]], axis=0))),
-    ("If the table was counted, count it again with more samples; one that was enumerated has all that its environment shows.",
-     lambda _: counted(3), lambda _: counted(2000)),
+    # demonstrations
     ("Read Minari datasets with `read_minari(dataset)`,",
      lambda root: empirical_policy(load_minari(ID, root=root), SIXTEEN, 4),
      lambda root: empirical_policy(read_minari(load_minari(ID, root=root)), SIXTEEN, 4)),
@@ -270,26 +252,18 @@ CASES = [
     ("Is it another version? Name an environment with --env-id.",
      lambda root: recorded_in(root, kwargs={"colour": 1}) or environment_of(None, {}, ID, str(root)),
      lambda root: environment_of("FrozenLake-v1", {}, ID, str(root))),
-    # given
-    ("Name the environment that it was trained in,",
-     lambda _: check_agent(agent(48), SIXTEEN.space, spaces.Discrete(4)),
-     lambda _: check_agent(agent(48), gym.make("CliffWalking-v1").observation_space, spaces.Discrete(4)) is None),
-    ("or train it in this one.",
-     lambda _: check_agent(agent(48), SIXTEEN.space, spaces.Discrete(4)),
-     lambda _: check_agent(agent(16), SIXTEEN.space, spaces.Discrete(4)) is None),
 ]  # fmt: skip
-FILES = [f"{one}.py" for one in ("datasets", "minari_files", "minari_formats", "endings", "listed_states", "cells",
-                                 "mdp/episodes", "dataset_files", "recorded", "expert_files")]  # fmt: skip
+FILES = [f"{one}.py" for one in ("datasets", "minari_files", "minari_formats", "endings", "mdp/episodes", "dataset_files",
+                                 "recorded")]  # fmt: skip
 ELSEWHERE = [
     "It comes first, then the policy.",
     "Give a table's, `table.states`.",  # test_mends_of_the_facade, as the next
     "Make one of a table, with `irl_gym.TabularPolicy(irl_gym.mdp.policies.as_distribution(policy, n_states, n_actions), "
     "table.states)`.",
-    "An expert read from a dataset cannot act; give the dataset.",
     "Write the dataset anew.",
     "Leave it out.",
 ]
-"""An expert that is given to a run; and what no writer of ours leaves, which is written anew as in other cases."""
+"""What no writer of ours leaves, which is written anew as in other cases."""
 
 
 def message(breaks, root):

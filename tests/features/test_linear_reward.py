@@ -200,7 +200,7 @@ class Own(OneHot):
         (Functions(squares, 2), "features is a Functions, code that no file can hold"),
         (RadialBasis(np.zeros((1, 2)), np.ones(2), lambda x: x), r"features\.coordinates is a function"),
         (Fourier([0, 0], [1, 1], 1, swapped), r"features\.coordinates is a function"),
-        (Own(3), "features is a Own"),
+        (Own(3), "features is an Own"),
     ],
 )
 def test_save_refuses_features_that_are_code(tmp_path, phi, message):

@@ -13,7 +13,7 @@ from rich.console import Console
 from irl_gym.agents.planners import FOR_CONTROL, SB3, ValueIteration
 from irl_gym.demonstrations.datasets import read_minari, write_minari
 from irl_gym.environments.rollouts import run_episodes
-from irl_gym.errors import DatasetMismatch, DatasetMissing, HiddenState, InvalidFeatures, NotDiscrete, NotTabular
+from irl_gym.errors import DatasetMismatch, DatasetMissing
 from irl_gym.features.feature_maps import OneHot
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.learners.linear_programs.feature import FeatureLP
@@ -26,7 +26,6 @@ from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.named_parts import features_named
 from irl_gym.runs.run import read_run
 from irl_gym.runs.supply import supplied
-from irl_gym.tables.enumeration.table import Enumeration
 
 LAKE_DATA, CAR_DATA, CART_DATA = (f"irl_gym/{name}-expert-v0" for name in ("frozenlake-v1", "mountaincar-v0", "cartpole-v1"))
 FEW = {"eval_episodes": 20, "retrain": ValueIteration()}
@@ -243,25 +242,6 @@ def test_the_report_says(runs, name):
 # --- refusals ---
 
 
-@pytest.mark.parametrize(
-    ("asked", "error", "match"),
-    [
-        (Experiment("CartPole-v1", 0.99, learner=cap_lp()), NotDiscrete, "--bins 5 --retrain.*Or learn .*TrajectoryLP"),
-        (Experiment("Blackjack-v1", 0.99, reveal={}, learner=cap_lp()), NotTabular, r"reveal.Reveal\(env\).*--table sample"),
-        pytest.param(  # a minute and a half, until what is hidden in Blackjack's deck of hands shows
-            Experiment("Blackjack-v1", 0.99, reveal={}, table=Enumeration(), learner=cap_lp()),
-            HiddenState,
-            "--reveal .*--table sample",
-            marks=pytest.mark.slow,
-        ),
-    ],
-)
-def test_feature_lp_without_a_table_is_refused_with_its_mend(tmp_path, asked, error, match):
-    with pytest.raises(error, match=match):
-        recover_and_retrain(asked, tmp_path / "run")
-    assert not (tmp_path / "run").exists()
-
-
 def test_a_dataset_that_is_missing_is_refused_with_those_that_are_there(runs, tmp_path):
     root = runs("table, features").out / "dataset"
     with pytest.raises(DatasetMissing, match=f"'lake-v0' is not under .* Name one of these: {LAKE_DATA}"):
@@ -278,11 +258,6 @@ def test_a_dataset_of_another_environment_is_refused(runs, tmp_path):
     )
     with pytest.raises(DatasetMismatch, match="8x8"):
         recover_and_retrain(asked, tmp_path)
-
-
-def test_features_of_other_observations_are_refused(tmp_path):
-    with pytest.raises(InvalidFeatures, match="observation 16 has no features"):
-        recover_and_retrain(Experiment("Taxi-v4", 0.99, episodes=2, learner=cap_lp(), **FEW), tmp_path)
 
 
 # --- the bar of the issue ---

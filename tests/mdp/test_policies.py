@@ -52,7 +52,7 @@ def test_support_is_the_actions_with_positive_probability():
         (np.array([[1.5, -0.5, 0], [1, 0, 0]]), r"policy\[s=0, a=1\] is -0\.5"),
         (np.array([[1.0, 0, 0], [np.nan, 1, 0]]), r"policy\[s=1, a=0\] is nan"),
         (np.array([[1.0, 0, 0], [0.5, 0.25, 0]]), r"policy\[s=1\] sums to 0\.75"),
-        (None, "policy is a NoneType: expected a table"),
+        (None, "policy is None: expected a table"),
     ],
 )
 def test_as_distribution_names_what_makes_it_no_policy(policy, message):

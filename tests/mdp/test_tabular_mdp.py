@@ -212,5 +212,5 @@ def test_a_discount_that_is_no_number_is_refused(gamma, unchecked):
 
 @pytest.mark.parametrize("P", [[["a"]], [[1.0], [0.5, 0.5]]])
 def test_a_table_that_cannot_be_read_as_numbers_is_refused(P):
-    with pytest.raises(InvalidMDP, match="P is list that cannot be read as numbers"):
+    with pytest.raises(InvalidMDP, match="P is a list that cannot be read as numbers"):
         TabularMDP(P, 0.9, [1.0])

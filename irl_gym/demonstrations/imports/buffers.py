@@ -17,7 +17,7 @@ from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.reading import reading
 from irl_gym.demonstrations.imports.rows import LogColumns, say_dropped
 from irl_gym.demonstrations.imports.values import as_array, is_list, truths
-from irl_gym.errors import InvalidDemonstrations
+from irl_gym.errors import InvalidDemonstrations, a_type
 from irl_gym.mdp.episodes import Episode
 from irl_gym.spaces.batches import by_part
 
@@ -55,7 +55,7 @@ def from_rollouts(
     """
     if not (hasattr(buffer, "dones") or hasattr(buffer, "episode_starts")) or not hasattr(buffer, "observations"):
         raise InvalidDemonstrations(
-            f"the buffer is {type(buffer).__name__}: expected a RolloutBuffer or a ReplayBuffer of Stable-Baselines3."
+            f"the buffer is {a_type(buffer)}: expected a RolloutBuffer or a ReplayBuffer of Stable-Baselines3."
         )
     if env is None:
         space = getattr(buffer, "observation_space", None) if space is None else space

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from irl_gym.demonstrations.imports.values import Name, shown
-from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter, NotInstalled
+from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter, NotInstalled, a_type
 from irl_gym.files.arrow_files import check_parquet
 from irl_gym.files.hdf5_files import BROKEN
 
@@ -45,7 +45,7 @@ def read_frame(source: Any, columns: dict[str, str], optional: frozenset[str] = 
         _check_columns("the frame", list(source.columns), columns, optional)
         return source, lambda row: f"row {row + 1} (index {source.index[row]})"
     if not isinstance(source, str | Path):
-        raise InvalidParameter(f"the source is {type(source).__name__}: expected a pandas DataFrame or the path of a file.")
+        raise InvalidParameter(f"the source is {a_type(source)}: expected a pandas DataFrame or the path of a file.")
     path = Path(source)
     kind = path.suffix.lower()
     if kind not in (*SEPARATORS, *PARQUET):

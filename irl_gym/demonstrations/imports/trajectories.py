@@ -15,7 +15,7 @@ from irl_gym.demonstrations.imports.cutting import from_lists
 from irl_gym.demonstrations.imports.files import closest
 from irl_gym.demonstrations.imports.reading import reading
 from irl_gym.demonstrations.imports.values import as_array, is_list
-from irl_gym.errors import DatasetMissing, InvalidDemonstrations
+from irl_gym.errors import DatasetMissing, InvalidDemonstrations, a_type
 from irl_gym.files.hdf5_files import BROKEN, check_hdf5
 from irl_gym.mdp.episodes import Episode
 
@@ -79,7 +79,7 @@ def _field(trajectory: Any, key: str, number: int) -> Any:
     value = trajectory.get(key) if isinstance(trajectory, Mapping) else getattr(trajectory, key, None)
     if value is None and key in ("obs", "acts"):
         raise InvalidDemonstrations(
-            f"trajectory {number} (from 0) is {type(trajectory).__name__} without {key!r}: expected obs and acts, as "
+            f"trajectory {number} (from 0) is {a_type(trajectory)} without {key!r}: expected obs and acts, as "
             "attributes or keys."
         )
     return value
@@ -131,7 +131,7 @@ def from_d4rl(
     """
     how = reading(space, n_actions, action_space, env, last)  # before a large file is read
     if not isinstance(source, Mapping | str | os.PathLike):
-        raise InvalidDemonstrations(f"the source is {type(source).__name__}: expected a dictionary of arrays, or a path.")
+        raise InvalidDemonstrations(f"the source is {a_type(source)}: expected a dictionary of arrays, or a path.")
     arrays = source if isinstance(source, Mapping) else _read_hdf5(Path(source))
     for key in ("observations", "actions", "terminals"):
         if key not in arrays:

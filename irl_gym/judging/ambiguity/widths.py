@@ -25,7 +25,7 @@ import numpy as np
 
 from irl_gym._typing import ActionSets, Indices
 from irl_gym.checks import checked_number, is_word
-from irl_gym.errors import InvalidParameter, SolverInfeasible
+from irl_gym.errors import InvalidParameter, SolverInfeasible, a_type
 from irl_gym.judging.ambiguity.feasible import Posed, jsonable, over_all_states, pose
 from irl_gym.judging.ambiguity.reward_sets import RewardSet, StateRewards, StepRewards
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -187,9 +187,7 @@ def _anchor(margin: Any, tau: float, r_max: float, states: int, pins: Mapping[An
 def _checked_pins(pinned: Pins, posed: Posed, mdp: TabularMDP, on: RewardOn, r_max: float) -> dict[Any, float]:
     """The pins by the row of a state among the reachable ones, or by (row, action), in units of r_max."""
     if not isinstance(pinned, Mapping):
-        raise InvalidParameter(
-            f"pinned is a {type(pinned).__name__}: expected a mapping of places to rewards, such as {{7: 1.0}}."
-        )
+        raise InvalidParameter(f"pinned is {a_type(pinned)}: expected a mapping of places to rewards, such as {{7: 1.0}}.")
     found: dict[Any, float] = {}
     shape = (mdp.n_states,) if on == "state" else (mdp.n_states, mdp.n_actions)
     for key, value in pinned.items():

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.diagnoses import nothing, sampled, solving, ties, truth, unseen, values, weights
 from irl_gym.judging.diagnoses.case import Case
@@ -96,7 +96,7 @@ def doctor(
     if learned is not None and learned.reward is None:
         return NO_REWARD
     if learned is None and mdp is None:
-        what = "None" if result is None else f"a {type(result).__name__}, a reward without a proof,"
+        what = f"{a_type(result)}{', a reward without a proof,' * (result is not None)}"
         raise InvalidParameter(f"result is {what} and mdp is None: expected a result, a table, or both.")
     reward = result if learned is None else learned.reward
     case = Case(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Numbers, Vector
-from irl_gym.errors import InvalidParameter, InvalidReward
+from irl_gym.errors import InvalidParameter, InvalidReward, a_type
 from irl_gym.judging.distances.canonical import Canonical, FreshDraws, ModelDraws, ValueAdjustedLevelling
 from irl_gym.judging.distances.comparing import ROUNDING, half_difference, norm, ranks, standardised
 from irl_gym.judging.distances.coverage import Coverage, coverage_of
@@ -201,7 +201,7 @@ def distance_matrix(distance: RewardDistance, mdp: TabularMDP, rewards: Mapping[
         what = getattr(distance, "__name__", repr(distance))
         raise InvalidParameter(f"distance is {what}: expected a record, such as `EPIC()`.")
     if not isinstance(rewards, Iterable):
-        raise InvalidReward(f"rewards is a {type(rewards).__name__}: expected several rewards, or a mapping of names to them.")
+        raise InvalidReward(f"rewards is {a_type(rewards)}: expected several rewards, or a mapping of names to them.")
     named = rewards if isinstance(rewards, Mapping) else {f"reward {i}": one for i, one in enumerate(rewards)}
     if not named:
         raise InvalidReward("rewards is empty: expected at least one reward.")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.errors import InvalidParameter, UndefinedDistance
+from irl_gym.errors import InvalidParameter, UndefinedDistance, a_type
 from irl_gym.judging.distances.transitions import Transitions
 from irl_gym.mdp.sampling import Successors
 from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable, checked_mdp
@@ -26,7 +26,7 @@ def stepped(model: Model, observations: Any, actions: np.ndarray, rng: np.random
     if isinstance(found, tuple) and len(found) == 2 and [np.shape(part)[:1] for part in found] == [(len(actions),)] * 2:
         return found[0], np.asarray(found[1], dtype=bool)
     raise InvalidParameter(
-        f"the model gives a {type(found).__name__} for {len(actions)} actions: expected a pair, (N, ...) next observations and "
+        f"the model gives {a_type(found)} for {len(actions)} actions: expected a pair, (N, ...) next observations and "
         "(N,) whether each is terminal."
     )
 

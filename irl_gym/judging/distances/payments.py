@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym._typing import Matrix, StateMask, Vector
-from irl_gym.errors import InvalidReward
+from irl_gym.errors import InvalidReward, a_type
 from irl_gym.judging.distances.comparing import numbers
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp, entry_rows
@@ -71,9 +71,9 @@ def payments(mdp: TabularMDP, reward: Any, name: str = "the reward") -> StepPaym
     """
     values = reward.values if isinstance(reward, TabularReward) else reward
     if hasattr(values, "reward"):
-        raise InvalidReward(f"{name} is an {type(values).__name__}, which holds a reward: pass its `.reward`.")
+        raise InvalidReward(f"{name} is {a_type(values)}, which holds a reward: pass its `.reward`.")
     if hasattr(values, "tabular"):
-        raise InvalidReward(f"{name} is a {type(values).__name__}: expected a table. Pass `reward.tabular(states)`.")
+        raise InvalidReward(f"{name} is {a_type(values)}: expected a table. Pass `reward.tabular(states)`.")
     S, A = checked_mdp(mdp).n_states, mdp.n_actions
     array, precision = numbers(name, values, "(S,), (S, A) or (S, A, S) numbers")
     if array.shape not in ((S,), (S, A), (S, A, S)):

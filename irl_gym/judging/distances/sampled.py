@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from irl_gym._typing import Numbers
-from irl_gym.errors import InvalidParameter, InvalidReward
+from irl_gym.errors import InvalidParameter, InvalidReward, a_type
 from irl_gym.judging.distances.comparing import numbers
 from irl_gym.judging.distances.jackknife import Distance, correlation_distance, jackknife
 from irl_gym.judging.distances.transitions import FreshSample, Transitions
@@ -42,7 +42,7 @@ class Payer:
     def __init__(self, reward: RewardCall):
         if not callable(reward):
             raise InvalidReward(
-                f"the reward is a {type(reward).__name__}: expected a function of (observations, actions, next observations), "
+                f"the reward is {a_type(reward)}: expected a function of (observations, actions, next observations), "
                 "such as the `pay` of a TabularReward where observations are rows of its table."
             )
         self.reward, self.largest, self.precision = reward, 0.0, 0.0
@@ -78,9 +78,7 @@ def checked_sample(sample: Any, kind: type[Sample]) -> Sample:
     if isinstance(sample, kind):
         return sample
     made = "from_episodes(episodes)" if kind is Transitions else "from_transitions(transitions, gamma, rng=rng)"
-    raise InvalidParameter(
-        f"the sample is a {type(sample).__name__}: expected {kind.__name__}, such as `{kind.__name__}.{made}`."
-    )
+    raise InvalidParameter(f"the sample is {a_type(sample)}: expected {kind.__name__}, such as `{kind.__name__}.{made}`.")
 
 
 def sampled_epic(first: RewardCall, second: RewardCall, transitions: Transitions, fresh: FreshSample) -> Distance:

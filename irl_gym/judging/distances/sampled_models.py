@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.judging.distances.jackknife import Distance, Roundings, jackknife, replicated_distance
 from irl_gym.judging.distances.models import Model, stepped
 from irl_gym.judging.distances.sampled import BLOCKS, ROWS, Payer, RewardCall, checked_sample
@@ -151,7 +151,7 @@ def _acted(policy: SampledActions, here: np.ndarray, rng: np.random.Generator) -
     found = policy(here, rng)
     if isinstance(found, tuple) or np.shape(found)[:1] != (len(here),):
         raise InvalidParameter(
-            f"the policy gives a {type(found).__name__} for {len(here)} observations: expected an array with one action for "
+            f"the policy gives {a_type(found)} for {len(here)} observations: expected an array with one action for "
             "each. Of SB3's predict take the first part: `lambda observations, rng: agent.predict(observations)[0]`."
         )
     return np.asarray(found)
@@ -176,13 +176,13 @@ def _replicates(replicates: Any) -> int:
 def _called(name: str, given: Any, such: str) -> Any:
     if callable(given):
         return given
-    raise InvalidParameter(f"{name} is a {type(given).__name__}: expected a function, such as {such}.")
+    raise InvalidParameter(f"{name} is {a_type(given)}: expected a function, such as {such}.")
 
 
 def _array(observations: Any) -> np.ndarray:
     if not isinstance(observations, np.ndarray):
         raise InvalidParameter(
-            f"the observations are a {type(observations).__name__}: expected an array, which a model can step. Flatten them, "
+            f"the observations are {a_type(observations)}: expected an array, which a model can step. Flatten them, "
             "for example with `gymnasium.wrappers.FlattenObservation`."
         )
     return observations

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irl_gym.checks import checked_number, checked_rng
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDistance
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UndefinedDistance, a_type
 from irl_gym.mdp.episodes import Episode, seen_parts
 from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.spaces.batches import batch_size, by_part, take
@@ -67,7 +67,7 @@ class Transitions:
         kept = list(episodes) if isinstance(episodes, Iterable) else [episodes]
         for wrong in (one for one in kept if not isinstance(one, Episode)):
             raise InvalidDemonstrations(
-                f"there is a {type(wrong).__name__} where an episode is expected: give Episodes, such as those of `collect`."
+                f"there is {a_type(wrong)} where an episode is expected: give Episodes, such as those of `collect`."
             )
         kept = seen_parts(kept)
         if not kept:
@@ -138,8 +138,7 @@ class FreshSample:
         """
         if not isinstance(transitions, Transitions):
             raise InvalidParameter(
-                f"transitions is a {type(transitions).__name__}: expected Transitions, such as "
-                "`Transitions.from_episodes(episodes)`."
+                f"transitions is {a_type(transitions)}: expected Transitions, such as `Transitions.from_episodes(episodes)`."
             )
         rng = checked_rng(rng)
         n = int(checked_number("n", n, "a whole number of at least 2", least=2, whole=True))
@@ -171,7 +170,7 @@ def _length(name: str, batch: Any) -> int:
     def check(part: Any) -> None:
         if not (isinstance(part, np.ndarray) and part.ndim):
             raise InvalidParameter(
-                f"{name} is a {type(part).__name__}: expected an array, or a dict or tuple of arrays, with one entry for each. "
+                f"{name} is {a_type(part)}: expected an array, or a dict or tuple of arrays, with one entry for each. "
                 "Stack a list with `np.array`."
             )
 

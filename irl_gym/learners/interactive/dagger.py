@@ -23,7 +23,7 @@ from irl_gym._typing import Matrix
 from irl_gym.checks import checked_number, discrete_actions, is_word
 from irl_gym.environments.closing import close
 from irl_gym.environments.rollouts import maker_of
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.interactive.labels import Asking, Labels
@@ -212,9 +212,7 @@ class DAgger:
         world = known.environment if known.dynamics is None else known.dynamics
         env = getattr(world, "env", None)
         if not isinstance(env, gym.Env):
-            raise InvalidParameter(
-                f"the environment is a {type(world).__name__} without `env`: expected one that can be stepped."
-            )
+            raise InvalidParameter(f"the environment is {a_type(world)} without `env`: expected one that can be stepped.")
         if self.episodes is None:
             raise InvalidParameter(
                 "episodes is None, and there is no table: expected a number of episodes a round. Give `episodes`, such as 20."

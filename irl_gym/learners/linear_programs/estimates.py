@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from irl_gym.errors import InvalidDemonstrations
+from irl_gym.errors import InvalidDemonstrations, a_type
 from irl_gym.mdp.episodes import Episode, seen_parts
 
 
@@ -98,7 +98,7 @@ def checked_episodes(episodes: Any) -> list[Episode]:
     """
     if isinstance(episodes, Episode | str) or not isinstance(episodes, Iterable):
         raise InvalidDemonstrations(
-            f"the expert is a {type(episodes).__name__}: expected its episodes, such as `read_minari(dataset)` gives."
+            f"the expert is {a_type(episodes)}: expected its episodes, such as `read_minari(dataset)` gives."
         )
     every = list(episodes)
     if not every:
@@ -106,7 +106,7 @@ def checked_episodes(episodes: Any) -> list[Episode]:
     for one in every:
         if not isinstance(one, Episode):
             raise InvalidDemonstrations(
-                f"the expert's episodes hold a {type(one).__name__}: expected episodes, such as `read_minari(dataset)` gives."
+                f"the expert's episodes hold {a_type(one)}: expected episodes, such as `read_minari(dataset)` gives."
             )
     return every
 

@@ -32,7 +32,7 @@ import numpy as np
 
 from irl_gym.checks import checked_number, float_array, is_word
 from irl_gym.environments.generative import GenerativeModel, least_horizon, truncation_bound
-from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy
+from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, a_type
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.learners.base import Outcome, featured
@@ -145,7 +145,7 @@ class FeatureLP(Record):
             if isinstance(world, TabularMDP):
                 return self._fit_table(world, expert, states, solving)
         raise InvalidMDP(
-            f"the world is a {type(world).__name__}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
+            f"the world is {a_type(world)}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`, or a "
             "GenerativeModel(env, gamma), first, and then the expert."
         )
 
@@ -178,7 +178,7 @@ class FeatureLP(Record):
     def _fit_model(self, model: GenerativeModel, expert: Policy, solving: Solving) -> Outcome[LinearReward, FeatureProof]:
         if not isinstance(expert, Policy):
             raise InvalidPolicy(
-                f"the expert is a {type(expert).__name__}: expected a policy with `predict`, since the model has no table."
+                f"the expert is {a_type(expert)}: expected a policy with `predict`, since the model has no table."
             )
         S_0 = self._states_of(model)
         horizon = least_horizon(model.gamma) if self.horizon is None else int(self.horizon)

@@ -31,7 +31,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from irl_gym.checks import checked_number, is_word
-from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible
+from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible, a_type
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs import programs
 from irl_gym.learners.linear_programs.partial import PartialTask
@@ -197,7 +197,7 @@ def checked_finite(learner: Any) -> FiniteLP:
         InvalidParameter: another learner.
     """
     if not isinstance(learner, FiniteLP):
-        raise InvalidParameter(f"learner is a {type(learner).__name__}: expected a FiniteLP, whose program it is.")
+        raise InvalidParameter(f"learner is {a_type(learner)}: expected a FiniteLP, whose program it is.")
     return learner
 
 

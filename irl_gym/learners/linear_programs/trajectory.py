@@ -23,7 +23,7 @@ import numpy as np
 
 from irl_gym.checks import checked_number, is_word
 from irl_gym.environments.generative import least_horizon, truncation_bound
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.features.feature_maps import FeatureMap, as_features, checked_features
 from irl_gym.features.feature_sums import discounted_sums
 from irl_gym.features.linear_reward import LinearReward
@@ -140,7 +140,7 @@ class TrajectoryLP(Record):
         """A result a round, `max_rounds` of them; arguments and errors as `fit`."""
         if not isinstance(world, World):
             raise InvalidParameter(
-                f"the world is a {type(world).__name__}: expected one that can be run and solved, such as "
+                f"the world is {a_type(world)}: expected one that can be run and solved, such as "
                 "Simulator(env, ValueIteration(), gamma)."
             )
         solving = Solving.begun(self.solver, self.time_limit)

@@ -4,6 +4,7 @@ Runs are called A, B, C, ... in the order they are given. Of the configurations 
 in one figure, as scores where the environments differ.
 """
 
+import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -150,54 +151,48 @@ def rewards(
     learned: Mapping[str, TabularReward | LinearReward | None], scenes: Mapping[str, Scene | None], places: Mapping[str, str]
 ) -> Section | None:
     """The learned rewards; one that several runs learned is drawn once."""
-    made: list[Panel] = []
-    for letters, reward in _different(learned, scenes, places):
-        letter = letters[0]
-        whose = f"Run{'s' * (len(letters) > 1)} {', '.join(letters)}"
-        if (scene := scenes[letter]) is None or scene.learned is None:
-            section = compared.weights(reward)
-            made += [replace(one, name=f"reward-{letter}", title=f"{whose}: weights") for one in section.panels]
-        else:
-            made.append(compared.reward_panel(f"reward-{letter}", f"{whose}: {places[letter]}", scene.learned, scene))
-    if not made:
-        return None
-    lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
-    lead += (
-        " Runs that recovered the same have one figure." if len(made) < sum(one is not None for one in learned.values()) else ""
-    )
-    return Section("rewards", "Learned rewards", lead, made)
-
-
-def _different(
-    learned: Mapping[str, TabularReward | LinearReward | None], scenes: Mapping[str, Scene | None], places: Mapping[str, str]
-) -> list[tuple[list[str], TabularReward | LinearReward]]:
-    """Each reward once, to the last digit, with the letters of the runs of one environment that learned it."""
-    found: dict[Any, tuple[list[str], TabularReward | LinearReward]] = {}
+    drawn: list[tuple[str, str, Panel]] = []
     for letter, reward in learned.items():
         if reward is None:
             continue
-        scene = scenes[letter]
-        if scene is not None and scene.learned is not None:
-            key: Any = (places[letter], scene.learned.values.shape, scene.learned.values.tobytes())
+        if (scene := scenes[letter]) is not None and scene.learned is not None:
+            panel = compared.reward_panel("reward", places[letter], scene.learned, scene)
+            drawn.append((letter, f"{panel.title} {scene.learned.values.tobytes()!r}", panel))
         else:  # features that only look alike are drawn by themselves
-            key = letter
-        found.setdefault(key, ([], reward))[0].append(letter)
-    return [*found.values()]
+            drawn += [(letter, letter, replace(one, name="reward", title="weights")) for one in compared.weights(reward).panels]
+    made = _once(drawn)
+    lead = "What each run recovered. Each has its own scale; compare patterns, not colours."
+    lead += " Runs that recovered the same have one figure." if len(made) < len(drawn) else ""
+    return Section("rewards", "Learned rewards", lead, made) if made else None
 
 
-def policies(scenes: Mapping[str, Scene | None]) -> Section | None:
-    """What is judged in each run, with what deviates shaded."""
-    made: list[Panel] = []
+def _once(drawn: Sequence[tuple[str, str, Panel]]) -> list[Panel]:
+    """Figures without those that say the same again, each with the letters of its runs in its name and title.
+
+    Args:
+        drawn: letter of the run, what figures share that say the same, and the figure.
+    """
+    found: dict[str, tuple[list[str], Panel]] = {}
+    for letter, same, panel in drawn:
+        found.setdefault(same, ([], panel))[0].append(letter)
+    return [
+        replace(one, name=f"{one.name}-{runs[0]}", title=f"Run{'s' * (len(runs) > 1)} {', '.join(runs)}: {one.title}")
+        for runs, one in found.values()
+    ]
+
+
+def policies(scenes: Mapping[str, Scene | None], places: Mapping[str, str]) -> Section | None:
+    """What is judged in each run, with what deviates shaded; a figure that several runs share is drawn once."""
+    drawn: list[tuple[str, str, Panel]] = []
     for letter, scene in scenes.items():
-        if scene is None:
-            continue
-        for panel in compared.policy_panels(scene):
+        for panel in () if scene is None else compared.policy_panels(scene):
             if panel.name != "policy-expert":
-                title = f"Run {letter}: {panel.title[0].lower()}{panel.title[1:]}"
-                made.append(replace(panel, name=f"{panel.name}-{letter}", title=title))
-    if not made:
-        return None
-    return Section("policies", "Policies", "What was judged in each run; shaded is where it deviates from its expert.", made)
+                one = replace(panel, title=f"{panel.title[0].lower()}{panel.title[1:]}")
+                drawn.append((letter, f"{places[letter]} {one.name} {one.caption} {json.dumps(one.spec())}", one))
+    made = _once(drawn)
+    lead = "What was judged in each run; shaded is where it deviates from its expert."
+    lead += " A figure that several runs share is drawn once." if len(made) < len(drawn) else ""
+    return Section("policies", "Policies", lead, made) if made else None
 
 
 def differences(configs: Mapping[str, Mapping[str, Any]]) -> Section:

@@ -16,6 +16,7 @@ from gymnasium import spaces
 from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, ValueIteration
 from irl_gym.environments.reveal import OBSERVATION
+from irl_gym.errors import with_article
 from irl_gym.features.bases import Fourier, Polynomial, RadialBasis
 from irl_gym.features.feature_maps import Functions, OneHot, Table, Unravel
 from irl_gym.learners.linear_programs.feature import FeatureLP
@@ -150,10 +151,10 @@ def _absent(key: str, value: Any) -> str | None:
     if isinstance(value, Mapping) and set(value) == {"array", "sha256"}:
         return f"an array of {' x '.join(f'{n:,}' for n in value['array'])} numbers"
     if isinstance(value, Mapping) and set(value) == {"object", "sha256"}:
-        return f"a {value['object']}"
+        return with_article(value["object"])
     if key in CALLED and isinstance(value, str):
         return f"which is {value}"
-    return f"a {value['type']}" if is_part(key, value) and value["type"] not in KINDS else None
+    return with_article(value["type"]) if is_part(key, value) and value["type"] not in KINDS else None
 
 
 def _python(key: str, value: Any, used: set[str]) -> str:

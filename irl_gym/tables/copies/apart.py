@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from irl_gym.errors import NotCopied
+from irl_gym.errors import NotCopied, a_type
 from irl_gym.tables.copies.object_graphs import ATOMS, CODE, GENERATORS, SHARED, attributes, children
 from irl_gym.tables.copies.own_dictionaries import rejoinable
 from irl_gym.tables.copies.replacing import held_by
@@ -137,7 +137,7 @@ def inside(value: Any) -> list[Any]:
 def leads_back(name: str, one: Any) -> NotCopied:
     """The error for what leads to an original from a copy, and the attribute by which it does."""
     return NotCopied(
-        f"{name} leads to a {type(one).__name__} of the environment that it was copied from, as through a function's "
+        f"{name} leads to {a_type(one)} of the environment that it was copied from, as through a function's "
         "variable or a weak reference, which copies share: expected all that changes in attributes alone. Make the "
         "function a method that uses `self`; or give the environment get_state() and set_state(state)."
     )
@@ -145,7 +145,7 @@ def leads_back(name: str, one: Any) -> NotCopied:
 
 def _two_ways(name: str, one: Any) -> NotCopied:
     return NotCopied(
-        f"{name or type(one).__name__} leads to a {type(one).__name__} whose __dict__ is held in another way too, by which its "
+        f"{name or type(one).__name__} leads to {a_type(one)} whose __dict__ is held in another way too, by which its "
         "attributes could change, and in copies could not: expected that it alone holds it. Hold the object, and write "
         "vars(...) of it where that is needed; give a dictionary a __getattr__ in the place of `self.__dict__ = self`; or "
         "give the environment get_state() and set_state(state)."

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.lib.array_utils import byte_bounds
 from numpy.lib.stride_tricks import as_strided
 
-from irl_gym.errors import NotCopied
+from irl_gym.errors import NotCopied, with_article
 
 T = TypeVar("T")
 Extent = tuple[int, int]
@@ -147,7 +147,9 @@ def of_a_file(one: Any, where: str = "an attribute") -> NotCopied:
 
 def _told(one: Any) -> str:
     shape = getattr(one, "shape", None)
-    return f"a {type(one).__module__}.{type(one).__name__}" + (f" of shape {tuple(shape)}" if shape is not None else "")
+    return with_article(f"{type(one).__module__}.{type(one).__name__}") + (
+        f" of shape {tuple(shape)}" if shape is not None else ""
+    )
 
 
 def copied(make: Callable[[dict[int, Any]], T], memo: dict[int, Any]) -> tuple[T, list[Any], dict[int, Any]]:

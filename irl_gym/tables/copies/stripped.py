@@ -15,7 +15,7 @@ from gymnasium.wrappers import TimeLimit
 
 from irl_gym.environments.learned_reward import LearnedReward
 from irl_gym.environments.watching_wrappers import only_watches
-from irl_gym.errors import NotCopied
+from irl_gym.errors import NotCopied, a_type
 from irl_gym.tables.copies.apart import check_apart, held_outside, inside, joined
 from irl_gym.tables.copies.object_graphs import SHARED, attributes, children
 from irl_gym.tables.copies.own_dictionaries import rejoin
@@ -154,7 +154,7 @@ def _copied_attribute(layer: gym.Env, name: str, value: Any, memo: dict[int, Any
             return None
         where, culprit = _culprit(value, f"{type(layer).__name__}.{name}", layers(layer))
         raise NotCopied(
-            f"{where} is a {type(culprit).__name__}, which cannot be copied ({type(error).__name__}: {error}): expected an "
+            f"{where} is {a_type(culprit)}, which cannot be copied ({type(error).__name__}: {error}): expected an "
             f"environment that copy.deepcopy copies. Give {type(layer.unwrapped).__name__} get_state() and set_state(state), "
             "or a __deepcopy__ that leaves this attribute out."
         ) from error

@@ -12,6 +12,7 @@ import operator
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any, NoReturn
 
+from irl_gym.errors import a_type
 from irl_gym.tables.draws.uniforms import CallRun, Uniform, Unit
 
 
@@ -161,7 +162,7 @@ def _shuffle(run: CallRun, x: Any) -> None:
 
 def _sample(run: CallRun, population: Any, k: int, *, counts: Iterable[int] | None = None) -> list[Any]:
     if not isinstance(population, Sequence):
-        raise Odd(f"a sample of a {type(population).__name__}")
+        raise Odd(f"a sample of {a_type(population)}")
     items = list(population)
     if counts is not None:
         times = list(counts)

@@ -20,7 +20,7 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 
 from irl_gym.checks import checked_number
-from irl_gym.errors import NotEnumerable
+from irl_gym.errors import NotEnumerable, a_type
 from irl_gym.tables.draws.draw_tree import Cut, Path, Script
 from irl_gym.tables.draws.driven import RANDOM, Odd
 from irl_gym.tables.draws.driven_modules import DrivenModules
@@ -157,7 +157,7 @@ class _StandIn:
 
     def __reduce_ex__(self, protocol: Any) -> NoReturn:
         raise NotEnumerable(
-            f"a {type(self).__name__} was pickled: expected copies by `copy.deepcopy`. It belongs to a search of this process; "
+            f"{a_type(self)} was pickled: expected copies by `copy.deepcopy`. It belongs to a search of this process; "
             "give the environment its own generator back first."
         )
 

@@ -162,7 +162,7 @@ def test_what_ppo_played_comes_back_but_for_the_last_observations():
 
 
 def test_no_buffer_is_refused():
-    with pytest.raises(InvalidDemonstrations, match="the buffer is list: expected a RolloutBuffer or a ReplayBuffer"):
+    with pytest.raises(InvalidDemonstrations, match="the buffer is a list: expected a RolloutBuffer or a ReplayBuffer"):
         from_rollouts([1, 2])
 
 

@@ -46,7 +46,7 @@ def test_wrapped_dictionaries_of_imitation_are_unwrapped():
     "trajectories, message",
     [
         ([], "there are no trajectories"),
-        ([GOOD, {"obs": [0, 1]}], r"trajectory 1 \(from 0\) is dict without 'acts'"),
+        ([GOOD, {"obs": [0, 1]}], r"trajectory 1 \(from 0\) is a dict without 'acts'"),
         ([GOOD, {"obs": [0], "acts": []}], "trajectory 1 .* has no steps"),
         ([GOOD, {"obs": [0, 4], "acts": [9]}], r"trajectory 1, step 0 \(from 0\) has action 9"),
         ([GOOD, {"obs": [0, 4], "acts": [1, 2, 3]}], "trajectory 1 .* has 2 observations and 3 actions"),

@@ -178,7 +178,7 @@ def test_record_is_json():
     (np.array([0, np.nan]), np.zeros((2, 2)), r"V\[1\] is nan"),
     (np.zeros(2), np.array([[0, -1.0], [0, 0]]), r"advantages\[s=0, a=1\] is -1"),
     (np.zeros(2), np.zeros(2), r"advantages has shape \(2,\)"),
-    ("abc", np.zeros((2, 2)), "V is str"),
+    ("abc", np.zeros((2, 2)), "V is a str"),
 ])  # fmt: skip
 def test_parts_of_a_reward_are_checked(unchecked, V, zeta, message):
     with pytest.raises(InvalidParameter, match=message):

@@ -217,7 +217,7 @@ def test_no_rows_leave_everything_open():
     ({"pinned": {(4, 0): 1.0}}, r"key \(4, 0\): expected a state"),
     ({"pinned": {4: 1.0}, "reward_on": "state-action"}, r"key 4: expected \(state, action\)"),
     ({"pinned": {(4, 0): 0.0}, "reward_on": "state-action"}, "state 4 is terminal"),
-    ({"pinned": np.zeros(25)}, "pinned is a ndarray: expected a mapping"),
+    ({"pinned": np.zeros(25)}, "pinned is an ndarray: expected a mapping"),
     ({"pinned": {(4, (2, 3)): 1.0}}, "expected a state"),
     ({"pinned": dict.fromkeys(range(25), 0.0)}, "and 20 more"),
     ({"pinned": {4: 2.0}}, r"pinned\[4\] is 2: expected at most r_max = 1"),

@@ -130,7 +130,7 @@ def test_a_reward_from_elsewhere_is_judged_by_its_values(kind):
 
 
 def test_a_reward_from_elsewhere_needs_a_table():
-    with pytest.raises(InvalidParameter, match="result is a ndarray, a reward without a proof, and mdp is None"):
+    with pytest.raises(InvalidParameter, match="result is an ndarray, a reward without a proof, and mdp is None"):
         doctor(np.zeros(25), None, None)
 
 

@@ -162,7 +162,7 @@ def test_a_reward_whose_sums_overflow_is_refused(distance):
 
 
 def test_a_matrix_is_of_several_rewards(unchecked):
-    with pytest.raises(InvalidReward, match="rewards is a NoneType"):
+    with pytest.raises(InvalidReward, match="rewards is None"):
         distance_matrix(EPIC(), MDP, None)
 
 

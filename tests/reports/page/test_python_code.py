@@ -85,7 +85,7 @@ def test_what_a_configuration_does_not_hold_is_named(tmp_path, asked, absent):
 
 def test_a_learner_of_the_users_own_is_named():
     config = {**Experiment("X-v0", 0.9).to_json(), "learner": {"type": "Own", "strength": 3}}
-    assert missing(config) == ["learner, a Own"] and "learner=...," in python_lines(config)
+    assert missing(config) == ["learner, an Own"] and "learner=...," in python_lines(config)
 
 
 def test_a_run_from_python_says_so(tmp_path):

@@ -93,7 +93,7 @@ class Uncopied:
 
 def test_without_watchers_names_what_a_copy_raised():
     error = KeyError("part")
-    with pytest.raises(NotTabular, match=r"Walk.inner is a Uncopied, which cannot be copied \(KeyError: 'part'\)") as told:
+    with pytest.raises(NotTabular, match=r"Walk.inner is an Uncopied, which cannot be copied \(KeyError: 'part'\)") as told:
         without_watchers(Walk(inner=Uncopied(error)))
     assert told.value.__cause__ is error
 

@@ -18,16 +18,16 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger, configure
 
+from irl_gym.agents.neural_labels import FitsLabels
 from irl_gym.agents.neural_proof import NeuralProof
 from irl_gym.agents.planners import Agent, torch_threads
 from irl_gym.checks import checked_number, discrete_actions, is_word
-from irl_gym.environments.tabular_vec_env import shows_rows
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
 from irl_gym.programs.status import Status
-from irl_gym.spaces.batches import batch_sizes, by_part, take
+from irl_gym.spaces.batches import batch_sizes, take
 
 Epoch = Callable[[int, float, float], None]
 """Called after each epoch with its number from 1, the mean loss of its minibatches, and that of what is held out, or NaN."""
@@ -41,7 +41,7 @@ class _Nowhere(gym.Env):
 
 
 @dataclass(frozen=True)
-class NeuralClone:
+class NeuralClone(FitsLabels):
     """Behaviour cloning by a network of Stable-Baselines3, kept as an agent of PPO.
 
     Raises:
@@ -95,17 +95,8 @@ class NeuralClone:
         """
         known = self.needs.of(problem, self)
         episodes: Any = known.demonstrations
-        states, actions = known.spaces.states, spaces.Discrete(int(discrete_actions(known.spaces.actions).n))
-        if states is not None and shows_rows(states):
-            space: spaces.Space = spaces.Discrete(states.n_states)
-            seen: Any = np.concatenate([one.rows(states)[:-1] for one in episodes])
-        else:
-            states, space = None, known.spaces.observations
-            parts = [take(one.observations, slice(None, -1)) for one in episodes]
-            seen = by_part(lambda *arrays: np.concatenate(arrays), *parts)
-        taken, lengths = np.concatenate([one.actions for one in episodes]), [len(one) for one in episodes]
-        found = self.fit(seen, taken, space, actions, lengths=lengths, rng=rng)
-        return Outcome(None, found.status, found.proof, found.stats, Agent(found.policy.model, states))
+        parts = [take(one.observations, slice(None, -1)) for one in episodes]
+        return self.fit_labels(parts, [one.actions for one in episodes], known.spaces, rng)
 
     def fit(
         self, observations: Any, actions: Any, observation_space: spaces.Space, action_space: spaces.Space, *,

@@ -149,7 +149,9 @@ class DAgger:
         own = self.beta == "indicator" or self.labels == "gated"
         return float(number == 1) if own else float(self.decay ** (number - 1))
 
-    def learn(self, problem: Problem, rng: np.random.Generator, folder: Path | None = None) -> Outcome[None, DaggerProof]:
+    def learn(
+        self, problem: Problem, rng: np.random.Generator, folder: Path | None = None, stage: gym.Env | None = None
+    ) -> Outcome[None, DaggerProof]:
         """The best round's policy, (S, A) or of a network; and in `labelled` the episodes, where there are some.
 
         Args:
@@ -157,6 +159,7 @@ class DAgger:
             rng: of episodes.
             folder: where answers and policies are kept, round by round: what finds them there goes on from them
                 (`irl_gym.learners.interactive.answers`). None for nowhere.
+            stage: what is stepped, such as an environment that a person looks at, without a table; None for a copy.
 
         Raises:
             MissingPart: one of these is not there.
@@ -165,7 +168,7 @@ class DAgger:
             InvalidPolicy: the oracle's answer is no action.
             RunConflict: the folder holds answers to other questions.
         """
-        played = [*self.iterate(problem, rng, folder)]
+        played = [*self.iterate(problem, rng, folder, stage)]
         by, merits = "last", np.arange(len(played), dtype=float)
         if played[0].value is not None:
             by, merits = "value", np.array([one.value for one in played], dtype=float)
@@ -183,7 +186,9 @@ class DAgger:
         stats = {"rounds": [{name: getattr(one, name) for name in each} for one in played]}
         return Outcome(None, Status.LEARNED, proof, stats, kept.policy, episodes or None)
 
-    def iterate(self, problem: Problem, rng: np.random.Generator, folder: Path | None = None) -> Iterator[Round]:
+    def iterate(
+        self, problem: Problem, rng: np.random.Generator, folder: Path | None = None, stage: gym.Env | None = None
+    ) -> Iterator[Round]:
         """A round at a time; arguments and errors as `learn`."""
         known: Any = self.needs.of(problem, self)
         A = int(discrete_actions(known.spaces.actions).n)
@@ -195,7 +200,7 @@ class DAgger:
                 "`Oracle(policy, gate=...)`. Or use labels='own'."
             )
         clones = self._clones(known, mdp, states, A, folder)
-        env = self._steppable(known) if mdp is None else None
+        env = stage if stage is not None else self._steppable(known) if mdp is None else None
         oracle = known.oracle if folder is None else Noted(known.oracle, Path(folder))
         labels = Labels(oracle, states, A, self.ask, gated=self.labels == "gated")
         policy = chance = clones.first()
@@ -252,13 +257,13 @@ class DAgger:
         return OfRows(learner, mdp, known.spaces, (states.n_states, A), priced, folder)
 
     def _steppable(self, known: Problem) -> gym.Env:
-        """The environment of a problem without a table: a copy, or the `stage` that the world says is to be stepped itself.
+        """A copy of the environment of a problem without a table.
 
         Raises:
             InvalidParameter: the world has none, or the number of episodes is missing.
         """
         world = known.environment if known.dynamics is None else known.dynamics
-        stage, env = getattr(world, "stage", None), getattr(world, "env", None)
+        env = getattr(world, "env", None)
         if not isinstance(env, gym.Env):
             raise InvalidParameter(
                 f"the environment is a {type(world).__name__} without `env`: expected one that can be stepped."
@@ -267,7 +272,7 @@ class DAgger:
             raise InvalidParameter(
                 "episodes is None, and there is no table: expected a number of episodes a round. Give `episodes`, such as 20."
             )
-        return maker_of(env)() if stage is None else stage
+        return maker_of(env)()
 
 
 def _judged(mdp: Any, policy: Matrix, reward: Any, shares: Matrix) -> tuple[float | None, float, float]:

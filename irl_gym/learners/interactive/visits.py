@@ -8,6 +8,7 @@ What was done and what the oracle says are two things: the learner learns from l
 none in a state that ends an episode. Axes: S states, A actions, N labelled visits, T steps.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -142,7 +143,7 @@ def stepped_visits(
     first, rows, found = int(getattr(env.action_space, "start", 0)), [], []
     for seed in rng.integers(2**31, size=episodes).tolist():
         observation, info = env.reset(seed=seed)
-        seen, told, paid = [observation], [], []
+        seen, told, paid = [copy.deepcopy(observation)], [], []  # an environment may go on changing it
         terminated = truncated = False
         while not (terminated or truncated):
             check_limit()
@@ -154,7 +155,7 @@ def stepped_visits(
             rows.append(row)
             told.append((label, asked, done))
             observation, reward, terminated, truncated, info = env.step(done + first)
-            seen.append(observation)
+            seen.append(copy.deepcopy(observation))
             paid.append(float(reward))
             truncated = truncated or (not terminated and len(told) == most)
         label, asked, done = (np.array(part) for part in zip(*told, strict=True))

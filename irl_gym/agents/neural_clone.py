@@ -9,22 +9,26 @@ imports torch, when a network is made: to read what the learner needs costs none
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.agents.neural_labels import FitsLabels
 from irl_gym.agents.neural_proof import Epoch, NeuralProof
 from irl_gym.checks import checked_number, discrete_actions, is_word
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
-from irl_gym.spaces.batches import batch_sizes, by_part, take
+from irl_gym.spaces.batches import batch_sizes, take
+
+if TYPE_CHECKING:
+    from stable_baselines3 import PPO
 
 
 @dataclass(frozen=True)
-class NeuralClone:
+class NeuralClone(FitsLabels):
     """Behaviour cloning by a network of Stable-Baselines3, kept as an agent of PPO.
 
     Raises:
@@ -73,22 +77,10 @@ class NeuralClone:
             MissingPart: there are no demonstrations. And whatever `fit` raises.
             NotDiscrete: actions that are not one number.
         """
-        from irl_gym.agents.planners import Agent
-        from irl_gym.environments.tabular_vec_env import shows_rows
-
         known = self.needs.of(problem, self)
         episodes: Any = known.demonstrations
-        states, actions = known.spaces.states, spaces.Discrete(int(discrete_actions(known.spaces.actions).n))
-        if states is not None and shows_rows(states):
-            space: spaces.Space = spaces.Discrete(states.n_states)
-            seen: Any = np.concatenate([one.rows(states)[:-1] for one in episodes])
-        else:
-            states, space = None, known.spaces.observations
-            parts = [take(one.observations, slice(None, -1)) for one in episodes]
-            seen = by_part(lambda *arrays: np.concatenate(arrays), *parts)
-        taken, lengths = np.concatenate([one.actions for one in episodes]), [len(one) for one in episodes]
-        found = self.fit(seen, taken, space, actions, lengths=lengths, rng=rng, on_epoch=on_epoch)
-        return Outcome(None, found.status, found.proof, found.stats, Agent(found.policy.model, states))
+        parts = [take(one.observations, slice(None, -1)) for one in episodes]
+        return self.fit_labels(parts, [one.actions for one in episodes], known.spaces, rng, on_epoch)
 
     def fit(
         self, observations: Any, actions: Any, observation_space: spaces.Space, action_space: spaces.Space, *,
@@ -111,19 +103,25 @@ class NeuralClone:
             InvalidDemonstrations: no step, parts of other lengths, or actions outside the space.
             InvalidParameter: balanced weights of actions that are not Discrete.
         """
-        from irl_gym.agents.neural_training import trained, untrained
+        from irl_gym.agents.neural_training import trained
 
         rng = np.random.default_rng(0) if rng is None else rng
         taken = _checked(observations, actions, action_space)
         each = np.array([len(taken)] if lengths is None else lengths)
         if each.sum() != len(taken):
             raise InvalidDemonstrations(f"the lengths add up to {each.sum()}: expected {len(taken)}, the number of steps.")
-        model = untrained(observation_space, action_space, self.net_arch, int(rng.integers(2**31)), self.device)
+        model = self._model(observation_space, action_space, rng)
         return trained(
             model, observations, taken, self._out(each, rng), self._counts(taken, action_space),
             rate=self.learning_rate, epochs=self.epochs, batch_size=self.batch_size, patience=self.patience, rng=rng,
             on_epoch=on_epoch, log=log,
         )  # fmt: skip
+
+    def _model(self, observations: spaces.Space, actions: spaces.Space, rng: np.random.Generator) -> "PPO":
+        """A new network."""
+        from irl_gym.agents.neural_training import untrained
+
+        return untrained(observations, actions, self.net_arch, int(rng.integers(2**31)), self.device)
 
     def _out(self, each: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """(N,) the steps that are held out: of whole episodes, where there are several."""

@@ -4,16 +4,19 @@ For example:
     irl-gym play --env-id Taxi-v4 --episodes 3 --dataset-id me/taxi-v0 --root data
     irl-gym play --env-id CartPole-v1 --mode window
     echo ddsssd | irl-gym play --env-kwargs is_slippery=false --episodes 1 --root data
+    irl-gym play --as-oracle --env-kwargs is_slippery=false --episodes 1
 """
 
 import io
 import os
+import shlex
 import shutil
 import signal
 import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from irl_gym.commands.terminal import UNSET, exit_code, print_error, read_arguments
@@ -48,6 +51,14 @@ class Arguments:
     """Of the first attempt; each further one has the next."""
     keep_unfinished: bool = False
     """Keep the episode that you break off at the end, as a truncated one."""
+    as_oracle: bool = False
+    """Be asked by a learner, DAgger: you play the first round, then watch it, and take over where it errs."""
+    rounds: int = 3
+    """Of --as-oracle: rounds of as many episodes as --episodes says; after each it learns."""
+    labels: Literal["own", "gated"] = "gated"
+    """Of --as-oracle: it acts until you take over (gated); or you are asked at each step, and it acts as it would (own)."""
+    out: Annotated[str | None, UNSET] = None
+    """Of --as-oracle: folder of your answers, from which the same command goes on, and of what was learned."""
 
 
 def command(words: Sequence[str]) -> int:
@@ -56,7 +67,7 @@ def command(words: Sequence[str]) -> int:
     return exit_code(lambda: main(asked), others="the environment")
 
 
-def show(play: "Play", turns: "list[Turn]", mode: str) -> None:
+def show(keys: str, turns: "list[Turn]", mode: str) -> None:
     """Draw turns and print what is said; on a terminal from its top, with the keys below."""
     from irl_gym.commands.demonstrating.playing import Turn
     from irl_gym.commands.demonstrating.screens import as_text, draw
@@ -67,7 +78,6 @@ def show(play: "Play", turns: "list[Turn]", mode: str) -> None:
     colours, size = sys.stdout.isatty(), shutil.get_terminal_size()
     lines = [as_text(turn, size.columns, size.lines - 6, colours=colours) for turn in turns]
     if colours and sys.stdin.isatty() and any(turn.frame is not None for turn in turns):
-        keys = str(play.controls)
         lines = ["\x1b[H\x1b[2J" + lines[0], *lines[1:], *(() if keys in lines[-1] else (keys,))]
     print(*lines, sep="\n\n", flush=True)
 
@@ -76,12 +86,43 @@ def play_on(play: "Play", mode: str) -> None:
     """Play until the game is over or no more keys come."""
     from irl_gym.commands.demonstrating.screens import terminal_keys, window_keys
 
-    show(play, [play.start()], mode)
+    said = str(play.controls)
+    show(said, [play.start()], mode)
     with closing(window_keys() if mode == "window" else terminal_keys()) as keys:
         for key in keys:
-            show(play, play.press(key), mode)
+            show(said, play.press(key), mode)
             if play.over:
                 return
+
+
+def be_asked(asked: Arguments) -> int:
+    """Answer a learner's questions, and say what it learned."""
+    from irl_gym.commands.demonstrating.asking import Asking, Left, Person, answers_in
+    from irl_gym.commands.demonstrating.keyboard import controls_of
+    from irl_gym.commands.demonstrating.playing import stage
+    from irl_gym.commands.demonstrating.screens import terminal_keys, window_keys
+    from irl_gym.runs.experiment import parse_keywords
+
+    given = parse_keywords(asked.env_kwargs)
+    plain, shown = stage(asked.env_id, given, asked.mode)
+    task = Asking(asked.env_id, given, asked.rounds, asked.episodes, asked.labels, asked.seed)
+    out = task.folder if asked.out is None else Path(asked.out)
+    for ending in ENDINGS:
+        signal.signal(ending, signal.default_int_handler)
+    with closing(window_keys() if asked.mode == "window" else terminal_keys()) as keys:
+        person = Person(shown, controls_of(plain, asked.keys), keys, lambda turn: show(person.help, [turn], asked.mode))
+        print(person.help, end="\n\n")
+        try:
+            found = task.learned(plain, person, out)
+        except (Left, KeyboardInterrupt) as end:
+            print(f"Answers that are kept in {out}: {answers_in(out)}. The same command goes on.")
+            return 1 if isinstance(end, Left) else 130
+    print(*(f"{one.label}: {one.sentence}." for one in found.facts()), sep="\n")
+    kept = next(one for one in (out / "policy.npz", out / "policy.zip") if one.exists())
+    print(f"What was learned is in {kept}, and the episodes with your answers in {out / 'labels'}. Look at it with")
+    words = ["irl-gym", "export", "--env-id", asked.env_id, *(("--env-kwargs", *asked.env_kwargs) if asked.env_kwargs else ())]
+    print(f"    {shlex.join([*words, '--expert', str(kept), '--episodes', '100', '--dataset-id', 'irl_gym/learned-v0'])}")
+    return 0
 
 
 def main(asked: Arguments) -> int:
@@ -98,6 +139,8 @@ def main(asked: Arguments) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that knows no arrows gets question marks
     try:
+        if asked.as_oracle:
+            return be_asked(asked)
         plain, shown = stage(asked.env_id, parse_keywords(asked.env_kwargs), asked.mode)
         play = Play(
             shown, controls_of(plain, asked.keys), asked.episodes, seed=asked.seed, keep_unfinished=asked.keep_unfinished

@@ -240,7 +240,7 @@ def publish(folder: Path, base: Path, dataset_id: str) -> None:
     os.replace(folder / dataset_id, final)
 
 
-def dataset_name(env_id: str) -> str:
-    """The Minari id under which a run's demonstrations are kept."""
+def dataset_name(env_id: str, of: str = "expert") -> str:
+    """The Minari id under which a run's demonstrations are kept, or what else it recorded."""
     plain = re.sub(r"[^-\w]+", "-", env_id.split(":")[-1]).lower()
-    return f"irl_gym/{plain}-expert-v0"
+    return f"irl_gym/{plain}-{of}-v0"

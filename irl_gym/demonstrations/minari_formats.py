@@ -75,7 +75,7 @@ def _hdf5(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
                 group.attrs[name] = value
             for name, values in _columns(episode, first_action).items():
                 _put(group, name, values)
-            group.create_group("infos")
+            _put(group, "infos", episode.infos(first_action))
 
         yield add
 
@@ -169,6 +169,8 @@ def _arrow(data: Path, space: spaces.Space, first_action: int) -> Iterator[Add]:
         columns = {"observations": _arrow_column(space, found.pop("observations"))}
         # As Minari has it, an empty row stands beside the last observation.
         columns.update({name: pa.array(np.append(values, values.dtype.type(0))) for name, values in found.items()})
+        if infos := episode.infos(first_action):
+            columns["infos"] = pa.StructArray.from_arrays([pa.array(one) for one in infos.values()], names=[*infos])
         place = data / str(number)
         place.mkdir()
         batch = pa.RecordBatch.from_pydict(columns)

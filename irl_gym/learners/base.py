@@ -60,6 +60,9 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
     """Of a table (S,) actions, (S, A) probabilities, or what has `predict`, whose deterministic actions a run keeps; without a
     table what has `predict`, of observations and of batches. There a run keeps agents of SB3 (`irl_gym.agents.planners.Agent`);
     any other policy is learned again where a run is continued. None of a learner of rewards alone."""
+    labelled: Any = None
+    """Of a learner that asks, the episodes in which it did, if there were some (`LabelledEpisode`); a run keeps them as a
+    Minari dataset, and so does `irl_gym.learners.interactive.labelled.write_labelled`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.reward, TabularReward | LinearReward | None):
@@ -105,6 +108,7 @@ class Learner(Protocol):
     """Learns from what is known of an expert and a world: a frozen record of hyper-parameters.
 
     It may say in `how` how its policy comes about; in `on_rows` that its policy is one of a table's rows; and in
+    `resumes` that `learn` takes a `folder` besides, in which it keeps what it has, and from which it goes on; and in
     `of_feasible_set` that its reward is one of all those under which the expert is optimal, so that these are examined: then it
     has `r_max` and `reward_on`, as FiniteLP has.
     """

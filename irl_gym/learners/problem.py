@@ -64,15 +64,36 @@ class Oracle:
         policy: what answers: what has `predict`, such as a TabularPolicy or an agent of SB3; or a function
             `(observation, info) -> action`. Actions count from 0.
         deterministic: passed to `predict`; False of an expert whose mistakes are drawn.
+        gate: `(observation, info, action) -> bool`: does the expert take over, where a learner would do `action`? None of one
+            that does not watch learners.
     """
 
-    def __init__(self, policy: Policy | Callable[[Any, Mapping[str, Any]], Any], deterministic: bool = True):
+    def __init__(
+        self,
+        policy: Policy | Callable[[Any, Mapping[str, Any]], Any],
+        deterministic: bool = True,
+        gate: Callable[[Any, Mapping[str, Any], int], Any] | None = None,
+    ):
         if not isinstance(policy, Policy) and not callable(policy):
             raise InvalidParameter(
                 f"the oracle's policy is {a_type(policy)}: expected one with `predict`, or a function (observation, "
                 "info) -> action. A table of actions is one as `TabularPolicy(actions, states)`."
             )
-        self.policy, self.deterministic, self.queries = policy, deterministic, 0
+        self.policy, self.deterministic, self.gate, self.queries = policy, deterministic, gate, 0
+
+    def takes_over(self, observation: Any, info: Mapping[str, Any] | None, action: int) -> bool:
+        """Does the expert act, where a learner would do `action`? Nobody is asked what is to be done: it is no query.
+
+        Raises:
+            InvalidPolicy: the gate's answer is neither True nor False; it is shown, with the observation.
+        """
+        assert self.gate is not None
+        answer = self.gate(observation, {} if info is None else info, action)
+        if not isinstance(answer, bool | np.bool_):
+            raise InvalidPolicy(
+                f"the gate's answer at observation {_told(observation)} is {answer!r:.80}: expected True or False."
+            )
+        return bool(answer)
 
     def ask(self, observation: Any, info: Mapping[str, Any] | None = None, *, n_actions: int | None = None) -> int:
         """What the expert does; one query more.
@@ -96,9 +117,14 @@ class Oracle:
                 return action
         last = "" if n_actions is None else f" to {n_actions - 1}"
         raise InvalidPolicy(
-            f"the oracle's answer to query {self.queries}, observation {short(observation)}, is {answer!r:.80}: expected an "
+            f"the oracle's answer to query {self.queries}, observation {_told(observation)}, is {answer!r:.80}: expected an "
             f"action, a whole number from 0{last}."
         )
+
+
+def _told(observation: Any) -> str:
+    """An observation in a few words."""
+    return short(observation.item() if isinstance(observation, np.generic) else observation)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
@@ -127,7 +126,7 @@ class Loop:
         """Run one stage, or read its record if it was finished before."""
         self._told(name, 0.0, "")
         record = self.folder.run(name, lambda folder: self._made(name, folder))
-        stages.under_way(self.path, name).unlink(missing_ok=True)
+        stages.clear(self.path, name)
         self._told(name, 1.0, "kept" if record.get("kept") else "")
         return record
 
@@ -220,7 +219,7 @@ class Loop:
     def outcome(self) -> Outcome:
         """What the learner gives, worked out now."""
         learner = self.experiment.learner
-        found: Any = learner.learn(self.problem, np.random.default_rng(self.experiment.seed))
+        found: Any = stages.learned(learner, self.problem, self.experiment.seed, self.path)
         if not isinstance(found, Outcome):
             raise InvalidParameter(f"{type(learner).__name__}.learn gave {a_type(found)}: expected an Outcome.")
         return found

@@ -27,6 +27,7 @@ def recover_and_retrain(
         config.json, run.json, environment.json       what was asked, who wrote it, where it took place
         table.npz, expert.npz, dataset/ (Minari)      expert.zip where there is no table; a dataset given is not copied
         reward.npz, certificate.json                  what was learned; learned_policy.npz of a learner that gives a policy
+        labels/ (Minari)                              episodes in which an oracle was asked, of a learner that asks
         reward_shaped.npz                             what to train an agent of one's own on: LearnedReward(env, this file)
         agent.zip, agent_policy.npz                   who was retrained; agent.shown.npz where it was shown rows of states
         clone_policy.npz                              who copies the demonstrations; clone.zip where there is no table

@@ -5,6 +5,7 @@ may be, and read from the dataset where there is one. Parts are those of `irl_gy
 """
 
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from irl_gym.judging.curves import Curve, write_curve
 from irl_gym.judging.evaluation import evaluate
 from irl_gym.judging.scores import CLONE, EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner, Outcome
+from irl_gym.learners.interactive.labelled import write_labelled
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.worlds import RunWorld
@@ -51,6 +53,23 @@ OnProgress = Callable[[str, float | None, str], None]
 def under_way(path: Path, stage: str) -> Path:
     """Where the training of a stage is kept until the stage is finished, in the folder of a run."""
     return path / f".{stage}.tmp.npz"
+
+
+def clear(path: Path, stage: str) -> None:
+    """Remove what was kept of a stage that is finished."""
+    under_way(path, stage).unlink(missing_ok=True)
+    shutil.rmtree(_rounds(path, stage), ignore_errors=True)
+
+
+def _rounds(path: Path, stage: str) -> Path:
+    """Where a learner that resumes keeps what it has until its stage is finished."""
+    return path / f".{stage}.tmp"
+
+
+def learned(learner: Learner, problem: Problem, seed: int, path: Path) -> Any:
+    """What a learner gives, worked out now; in the folder of a run that was killed one that resumes goes on where it was."""
+    more: dict[str, Any] = {"folder": _rounds(path, "reward")} if getattr(learner, "resumes", False) else {}
+    return learner.learn(problem, np.random.default_rng(seed), **more)
 
 
 def planned_expert(
@@ -115,7 +134,7 @@ def played_episodes(
 
 def learned_outcome(
     folder: Path, learner: Learner, problem: Problem, outcome: Outcome, world: RunWorld, table: Tabulation | None,
-    known_expert: Any, from_episodes: bool,
+    known_expert: Any, from_episodes: bool, env: gym.Env, env_id: str,
 ) -> dict[str, Any]:  # fmt: skip
     """The reward or the policy that a learner finds, or both, and what it proves."""
     if table is None and outcome.reward is not None and outcome.reward.alpha is None:
@@ -133,6 +152,13 @@ def learned_outcome(
     if table is not None and outcome.reward is not None:
         tabular = outcome.reward.tabular(table.states)
         ShapedReward.of(tabular, table.mdp, certificate["proof"]["terms"].get("margin_cap") or None).save(folder / SHAPED)
+    if outcome.labelled:
+        record["labels_id"] = dataset_name(env_id, "labels")
+        (root := folder / "labels").mkdir()
+        paid, seen, acts = table is None or problem.reward is not None, env.observation_space, env.action_space
+        write_labelled(
+            outcome.labelled, record["labels_id"], env, root=root, observation_space=seen, action_space=acts, paid=paid
+        )
     if problem.environment is not None:
         record["stats"]["exact_planner"] = bool(getattr(problem.environment, "exact", False))
     return record

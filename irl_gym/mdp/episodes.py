@@ -86,6 +86,10 @@ class Episode(Record):
         """Undiscounted return."""
         return float(np.sum(self.rewards))
 
+    def infos(self, first_action: int) -> dict[str, np.ndarray]:
+        """What is told of each moment besides, (T + 1,) by name, where actions count from `first_action`: here nothing."""
+        return {}
+
     def rows(self, states: States) -> np.ndarray:
         """(T+1,) the states visited; the last but one again where the last was not seen.
 

@@ -19,6 +19,7 @@ import irl_gym
 from irl_gym.agents.experts import Acting
 from irl_gym.demonstrations.imports import from_arrays
 from irl_gym.environments.generative import GenerativeModel
+from irl_gym.errors import RunConflict
 from irl_gym.features.bases import RadialBasis
 from irl_gym.features.feature_maps import Functions, OneHot
 from irl_gym.features.linear_reward import LinearReward
@@ -171,6 +172,10 @@ CASES = [
     ("Give the next observations when they are imported.",
      one_step, lambda: one_step(next_observations=[4, 8])),
     ("Ask for a shorter horizon, such as 3.", lambda: broken_off(asked=5), lambda: broken_off(asked=3)),
+    ("Or use labels='own'.", lambda: interactive(episodes=2, labels="gated"),
+     lambda: interactive(episodes=2, labels="own").proof.queries),
+    ("Or use cost='mistakes'.", lambda: interactive(episodes=2, cost="advantage"),
+     lambda: interactive(episodes=2, cost="mistakes").proof.queries),
     ("Give `episodes`, such as 20.", interactive, lambda: interactive(episodes=20).proof.queries),
     ("Choose a larger S_0.",
      lambda: on_features(OneHot(2), [1], ring([[1, 0], [0, 0]]), FIRST),
@@ -286,3 +291,17 @@ def test_every_mend_that_an_error_about_rewards_names_is_executed():
         for one in (root / folder).rglob("*.py")
     ]
     assert not unsaid(CASES, *files, "killable.py", "warm_lp.py", "linear_program.py", "solvers.py", "deadline.py", "howard.py")
+
+
+def test_answers_to_other_questions_are_left_where_they_are_or_deleted(tmp_path):
+    def asked(folder, seed=0):
+        known = Problem.of(MODEL.mdp, oracle=Oracle(lambda row, info: 0))
+        return DAgger(rounds=1, episodes=3, max_episode_steps=5).learn(known, np.random.default_rng(seed), tmp_path / folder)
+
+    asked("one")
+    (tmp_path / "one/answers.txt").write_text("ask 0123456789abcdef 0\n")
+    with pytest.raises(RunConflict, match=r"Choose another folder, or delete it, and all is asked anew."):
+        asked("one")
+    found = asked("another").proof.queries
+    (tmp_path / "one/answers.txt").unlink()
+    assert asked("one").proof.queries == found

@@ -6,7 +6,7 @@ most frequent action, for each macrocell of a grid. Axes: S states, A actions.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -107,6 +107,21 @@ class Clone:
         return Outcome(
             None, Status.LEARNED, CloneProof(**told_of(counts, policy, shown, table, told)), {"cells": cells}, policy
         )
+
+    def fit_costs(
+        self, costs: np.ndarray, visited: StateMask, table: TransitionTable | None = None, /, *, states: States | None = None
+    ) -> Outcome[None, CloneProof]:
+        """The policy of the class that costs least where it was visited: the cheapest action of each cell, the lowest of ties.
+
+        Args:
+            costs: (S, A) what each action costs, added up over all visits of a state.
+            visited: (S,) where that is known.
+            table: as `fit`, and so the errors.
+            states: not used.
+        """
+        gains = np.where(visited[:, None], costs.max(axis=1, keepdims=True) - costs, 0.0)
+        gains[visited] += np.finfo(float).eps * (gains.max() or 1.0)  # a state where all cost the same was visited too
+        return replace(self, majority=True, smoothing=0.0).fit(gains, table)
 
     def _pooled(self, counts: Matrix) -> tuple[Matrix, int]:
         """(S, A) the counts of each state's cell, and how many cells there are."""

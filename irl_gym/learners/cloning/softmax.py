@@ -108,6 +108,26 @@ class SoftmaxClone:
             )
         return Outcome(None, Status.OPTIMAL, proof, {"iterations": iterations, "theta": theta.tolist()}, policy)
 
+    def fit_costs(
+        self, costs: np.ndarray, visited: np.ndarray, table: TransitionTable | None = None, /, *, states: States | None = None
+    ) -> Outcome[None, SoftmaxProof]:
+        """Cost-weighted classification: clone the cheapest actions, each state weighted by what others cost more on average.
+
+        Convex in place of the cost itself, which is not; it is the least cost where the features tell all states apart.
+
+        Args:
+            costs: (S, A) what each action costs, added up over all visits of a state.
+            visited: (S,) where that is known.
+            table: as `fit`, and so the errors.
+            states: as `fit`.
+        """
+        rows, best = np.arange(len(costs)), costs.argmin(axis=1)
+        weights = np.where(visited, costs.mean(axis=1) - costs[rows, best], 0.0)
+        weights[visited] += np.finfo(float).eps * (weights.max() or 1.0)
+        labels = np.zeros(costs.shape)
+        labels[rows, best] = weights
+        return self.fit(labels, table, states=states)
+
     def _solved(self, X: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, float, int]:
         """Theta (K, A), the norm of the gradient there, and the iterations; of features (m, K) and shares (m, A)."""
         shape, here = (X.shape[1], n.shape[1]), n.sum(axis=1, keepdims=True)

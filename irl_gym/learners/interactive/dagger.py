@@ -4,7 +4,9 @@
               D <- D + {(s, pi*(s)) of these visits}
               pi^_{i+1} = the clone of D, in the class of the cloning learner
     at last   the best of the pi^
-With `labels="clean"` the visits are those of the expert under noise (DART), and the labels its own.
+With `labels="clean"` the visits are those of the expert under noise (DART), and the labels its own. With `labels="gated"` the
+learner acts until the oracle takes over, and only what it does then is learned (HG-DAgger; Kelly et al. 2019). With
+`cost="advantage"` labels have the prices of `prices` (AggreVaTe).
 Best is, where the table is known: of the highest value, exactly, if the reward is known; else with the fewest steps at odds
     odds(pi) = sum_s d_pi(s) (1 - pi(pi*(s) | s)),   a step in a state without a label counting whole,
 which is what the oracle's value is more than pi's at most, in units of the most that one other action costs (its advantage,
@@ -12,8 +14,9 @@ summed along d_pi). With odds of 0, if it asks only where nothing was answered y
 Axes: S states, A actions.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, Literal, get_args
 
 import gymnasium as gym
@@ -23,10 +26,13 @@ from irl_gym._typing import Matrix
 from irl_gym.checks import checked_number, discrete_actions, is_word
 from irl_gym.environments.closing import close
 from irl_gym.environments.rollouts import maker_of
-from irl_gym.errors import InvalidParameter, a_type
+from irl_gym.errors import InvalidParameter, NotDiscrete, a_type
 from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.cloning.clone import Clone
+from irl_gym.learners.interactive.answers import Noted
+from irl_gym.learners.interactive.classes import OfRows, PolicyClass, Seen, check_clones
 from irl_gym.learners.interactive.labels import Asking, Labels
+from irl_gym.learners.interactive.prices import prices
 from irl_gym.learners.interactive.proofs import DaggerProof
 from irl_gym.learners.interactive.visits import LabelledVisits, drawn_visits, exact_visits, reached, stepped_visits
 from irl_gym.learners.needs import Needs
@@ -39,7 +45,8 @@ from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex, States
 
 Schedule = Literal["indicator", "linear", "exponential"]
-Whence = Literal["own", "clean"]
+Whence = Literal["own", "clean", "gated"]
+Costs = Literal["mistakes", "advantage"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +57,8 @@ class Round(Record):
     """Share of the steps in which the oracle's action was taken."""
     visits: LabelledVisits
     """What was visited and labelled in this round."""
-    policy: Matrix
-    """(S, A) the clone of all labels so far."""
+    policy: Any
+    """(S, A) the clone of all labels so far; of a network, what has `predict`."""
     queries: int
     """So far."""
     mistakes: float
@@ -64,8 +71,8 @@ class Round(Record):
     """Discounted steps that it makes; None where there is no table."""
     contradicted: int
     """States in which the oracle did not always answer the same, so far."""
-    labelled: int
-    """States in which it answered, so far."""
+    labelled: int | None
+    """States in which it answered, so far; None where they are not numbered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +80,14 @@ class DAgger:
     """Dataset aggregation.
 
     Raises:
-        InvalidParameter: a field outside its range, or a learner that clones no labels of states.
+        InvalidParameter: a field outside its range, or a learner that clones no labels.
         UnknownLearner: a learner's name that is none.
     """
 
     rounds: int = 10
     """At most; fewer with `ask="unseen"` where nothing is left to learn."""
     learner: Any = field(default_factory=Clone)
-    """Clones the labels: `Clone(...)` or `SoftmaxClone(...)`, whose fields make the class; or its name, `softmax-clone`."""
+    """Clones the labels: `Clone(...)`, `SoftmaxClone(...)` or `NeuralClone(...)`, whose fields make the class; or its name."""
     beta: Schedule = "indicator"
     """beta_i: 1 in the first round and 0 later; from 1 to 0 linearly; or decay^(i - 1)."""
     decay: float = 0.5
@@ -92,15 +99,18 @@ class DAgger:
     """Longer episodes are cut."""
     labels: Whence = "own"
     """Of states to which the mixture comes, more and more the learner's own; or clean ones of states to which the expert comes
-    under `noise`, in every round, whatever beta: the learner never acts (DART; Laskey et al. 2017, with a noise that stays)."""
+    under `noise`, in every round, whatever beta: the learner never acts (DART; Laskey et al. 2017, with a noise that stays); or
+    gated: after a first round that is the oracle's, whatever beta, the learner acts until the oracle's `gate` takes over."""
     noise: float = 0.1
     """Of `labels="clean"`: probability of a random action in place of the expert's, between 0 and 1."""
     ask: Asking = "always"
     """Ask at each visit, or only in states in which the oracle has not answered yet; its answer then serves at each visit."""
+    cost: Costs = "mistakes"
+    """What is minimised: mistakes; or what they cost, by the advantages of an oracle that is a table, under the true reward."""
     needs: ClassVar[Needs] = Needs(("oracle", "dynamics or environment"), ("reward", "features"))
-    """The parts of a problem that `learn` reads; the reward only tells which round is the best."""
-    on_rows: ClassVar[bool] = True
-    """Its policy is one of numbered states, so that without them there is none."""
+    """The parts of a problem that `learn` reads; the reward tells which round is the best, and what mistakes cost."""
+    resumes: ClassVar[bool] = True
+    """`learn` takes a folder, and goes on where it was."""
 
     def __post_init__(self) -> None:
         checked_number("rounds", self.rounds, "a whole number of at least 1", least=1, whole=True)
@@ -109,44 +119,56 @@ class DAgger:
         checked_number("max_episode_steps", self.max_episode_steps, "a whole number of at least 1", least=1, whole=True)
         if self.episodes is not None:
             checked_number("episodes", self.episodes, "a whole number of at least 1, or None", least=1, whole=True)
-        for name, words in (("beta", get_args(Schedule)), ("ask", get_args(Asking)), ("labels", get_args(Whence))):
-            if not is_word(getattr(self, name), *words):
-                raise InvalidParameter(f"{name} is {getattr(self, name)!r:.60}: expected one of {', '.join(words)}.")
+        words = {"beta": Schedule, "ask": Asking, "labels": Whence, "cost": Costs}
+        for name, known in words.items():
+            if not is_word(getattr(self, name), *get_args(known)):
+                raise InvalidParameter(f"{name} is {getattr(self, name)!r:.60}: expected one of {', '.join(get_args(known))}.")
         if isinstance(self.learner, str):
             object.__setattr__(self, "learner", learner_of(self.learner, {}))
-        needs, fit, on_rows = (getattr(self.learner, name, None) for name in ("needs", "fit", "on_rows"))
-        if not (isinstance(needs, Needs) and needs.column == "passive" and callable(fit) and on_rows):
-            what = "one that clones labels of states, Clone(...) or SoftmaxClone(...)"
-            raise InvalidParameter(f"the learner is {self.learner!r:.60}: expected {what}.")
+        check_clones(self.learner, priced=self.cost == "advantage", sampled=self.episodes is not None)
+
+    @property
+    def on_rows(self) -> bool:
+        """Is its policy one of numbered states, so that without them there is none?"""
+        return bool(getattr(self.learner, "on_rows", False))
 
     @property
     def how(self) -> str:
         """How its policy comes about."""
-        where = "where it went itself (DAgger)" if self.labels == "own" else "where the expert went under noise (DART)"
-        return f"cloned from the oracle's answers {where}"
+        where = {"own": "where it went itself (DAgger)", "clean": "where the expert went under noise (DART)",
+                 "gated": "where it took over from the learner (HG-DAgger)"}[self.labels]  # fmt: skip
+        priced = ", at the price of mistakes (AggreVaTe)" if self.cost == "advantage" else ""
+        return f"cloned from the oracle's answers {where}{priced}"
 
     def share(self, number: int) -> float:
-        """The oracle's share of the steps of round i, from 1."""
+        """The oracle's share of the steps of round i, from 1; where it is gated, of those in which it has no choice."""
         if self.labels == "clean":
             return 1 - self.noise
-        if self.beta == "linear":
+        if self.beta == "linear" and self.labels == "own":
             return 1.0 if self.rounds == 1 else 1 - (number - 1) / (self.rounds - 1)
-        return float(number == 1) if self.beta == "indicator" else float(self.decay ** (number - 1))
+        own = self.beta == "indicator" or self.labels == "gated"
+        return float(number == 1) if own else float(self.decay ** (number - 1))
 
-    def learn(self, problem: Problem, rng: np.random.Generator) -> Outcome[None, DaggerProof]:
-        """The best round's policy (S, A).
+    def learn(
+        self, problem: Problem, rng: np.random.Generator, folder: Path | None = None, stage: gym.Env | None = None
+    ) -> Outcome[None, DaggerProof]:
+        """The best round's policy, (S, A) or of a network; and in `labelled` the episodes, where there are some.
 
         Args:
             problem: with an oracle, and a table or an environment; with features, if the learner is to have the problem's.
             rng: of episodes.
+            folder: where answers and policies are kept, round by round: what finds them there goes on from them
+                (`irl_gym.learners.interactive.answers`). None for nowhere.
+            stage: what is stepped, such as an environment that a person looks at, without a table; None for a copy.
 
         Raises:
             MissingPart: one of these is not there.
             NotDiscrete: observations that cannot be numbered, or actions that are not one number.
-            InvalidParameter: no table, and no number of episodes.
+            InvalidParameter: no table and no number of episodes; no gate, or no prices, where these are asked for.
             InvalidPolicy: the oracle's answer is no action.
+            RunConflict: the folder holds answers to other questions.
         """
-        played = [*self.iterate(problem, rng)]
+        played = [*self.iterate(problem, rng, folder, stage)]
         by, merits = "last", np.arange(len(played), dtype=float)
         if played[0].value is not None:
             by, merits = "value", np.array([one.value for one in played], dtype=float)
@@ -154,54 +176,85 @@ class DAgger:
             by, merits = "odds", -np.array([one.odds for one in played], dtype=float)
         best = int(merits.argmax())
         kept, last = played[best], played[-1]
+        episodes = tuple(one for each in played for one in each.visits.episodes)
         proof = DaggerProof(
             last.queries, len(played), int(self.rounds), last.labelled, last.contradicted,
-            None if self.episodes is None else sum(one.visits.states.size for one in played), best + 1, by, kept.value,
-            kept.odds, kept.acting, last.mistakes,
+            None if self.episodes is None else sum(map(len, episodes)), best + 1, by, kept.value, kept.odds, kept.acting,
+            last.mistakes,
         )  # fmt: skip
         each = ("beta", "queries", "mistakes", "value", "odds")
         stats = {"rounds": [{name: getattr(one, name) for name in each} for one in played]}
-        return Outcome(None, Status.LEARNED, proof, stats, kept.policy)
+        return Outcome(None, Status.LEARNED, proof, stats, kept.policy, episodes or None)
 
-    def iterate(self, problem: Problem, rng: np.random.Generator) -> Iterator[Round]:
+    def iterate(
+        self, problem: Problem, rng: np.random.Generator, folder: Path | None = None, stage: gym.Env | None = None
+    ) -> Iterator[Round]:
         """A round at a time; arguments and errors as `learn`."""
         known: Any = self.needs.of(problem, self)
-        learner = featured(self.learner, problem) if "features" in self.learner.needs.parts else self.learner
         A = int(discrete_actions(known.spaces.actions).n)
-        states = known.spaces.states or StateIndex(known.spaces.observations)
         mdp = known.dynamics if isinstance(known.dynamics, TabularMDP) else None
-        env = self._steppable(known) if mdp is None else None
-        labels = Labels(known.oracle, states, A, self.ask)
-        visit = self._visiting(mdp, env, states, labels, rng)
-        policy = chance = np.full((states.n_states, A), 1 / A)
-        weights = np.zeros(policy.shape)
+        states = self._states(known)
+        if self.labels == "gated" and known.oracle.gate is None:
+            raise InvalidParameter(
+                "labels is 'gated', and the oracle has no gate: expected one that says where it takes over, "
+                "`Oracle(policy, gate=...)`. Or use labels='own'."
+            )
+        clones = self._clones(known, mdp, states, A, folder)
+        env = stage if stage is not None else self._steppable(known) if mdp is None else None
+        oracle = known.oracle if folder is None else Noted(known.oracle, Path(folder))
+        labels = Labels(oracle, states, A, self.ask, gated=self.labels == "gated")
+        policy = chance = clones.first()
         try:
             for number in range(1, self.rounds + 1):
                 beta = self.share(number)
-                visits = visit(chance if self.labels == "clean" else policy, beta)
-                weights += visits.aggregated(weights.shape)
-                mistakes = visits.mistakes(policy)
-                policy = np.asarray(learner.fit(weights, mdp, states=known.spaces.states).policy)
-                judged = (None, None, None) if mdp is None else _judged(mdp, policy, known.reward, labels.shares)
-                labelled = int(labels.counts.any(axis=1).sum())
-                yield Round(beta, visits, policy, labels.queries, mistakes, *judged, labels.contradicted, labelled)
+                acting = chance if self.labels == "clean" else policy
+                visits = self._visits(known, mdp, env, clones, acting, beta, labels, rng, number)
+                mistakes = clones.mistakes(policy, visits)
+                policy = clones.learned(visits, rng)
+                matrix = None if mdp is None else clones.matrix(policy)
+                judged = (None, None, None) if matrix is None else _judged(mdp, matrix, known.reward, labels.shares)
+                yield Round(beta, visits, policy, labels.queries, mistakes, *judged, labels.contradicted, labels.labelled)
                 if judged[1] == 0 and self.ask == "unseen":
                     return
         finally:
             if env is not None:
                 close(env)
 
-    def _visiting(
-        self, mdp: TabularMDP | None, env: gym.Env | None, states: States, labels: Labels, rng: np.random.Generator
-    ) -> Callable[[Matrix, float], LabelledVisits]:
-        """What plays a round: of a policy and beta."""
+    def _visits(
+        self, known: Problem, mdp: TabularMDP | None, env: gym.Env | None, clones: PolicyClass, policy: Any, beta: float,
+        labels: Labels, rng: np.random.Generator, number: int,
+    ) -> LabelledVisits:  # fmt: skip
+        """A round, played."""
         n, most = self.episodes, self.max_episode_steps
-        if env is not None and n is not None:
-            return lambda policy, beta: stepped_visits(env, states, policy, beta, labels, n, most, rng)
-        assert mdp is not None
-        if n is not None:
-            return lambda policy, beta: drawn_visits(mdp, policy, beta, labels, n, most, rng)
-        return lambda policy, beta: exact_visits(mdp, policy, beta, labels)
+        if mdp is None:
+            assert env is not None and n is not None
+            return stepped_visits(env, lambda *seen: clones.act(policy, *seen), beta, labels, n, most, rng, number)
+        if n is None:
+            return exact_visits(mdp, clones.matrix(policy), beta, labels)
+        return drawn_visits(mdp, clones.matrix(policy), beta, labels, n, most, rng, known.reward, number)
+
+    def _states(self, known: Problem) -> States | None:
+        """Who numbers observations; None where a network learns from such as cannot be.
+
+        Raises:
+            NotDiscrete: they cannot be numbered, and have to be.
+        """
+        try:
+            return known.spaces.states or StateIndex(known.spaces.observations)
+        except NotDiscrete:
+            if self.on_rows or self.ask == "unseen":
+                raise
+            return None
+
+    def _clones(
+        self, known: Problem, mdp: TabularMDP | None, states: States | None, A: int, folder: Path | None
+    ) -> PolicyClass:
+        if not self.on_rows:
+            return Seen(self.learner, known.spaces, states, A, folder)
+        assert states is not None
+        learner: Any = featured(self.learner, known) if "features" in self.learner.needs.parts else self.learner
+        priced = prices(known.oracle, mdp, known.reward) if self.cost == "advantage" else None
+        return OfRows(learner, mdp, known.spaces, (states.n_states, A), priced, folder)
 
     def _steppable(self, known: Problem) -> gym.Env:
         """A copy of the environment of a problem without a table.
@@ -220,7 +273,7 @@ class DAgger:
         return maker_of(env)()
 
 
-def _judged(mdp: TabularMDP, policy: Matrix, reward: Any, shares: Matrix) -> tuple[float | None, float, float]:
+def _judged(mdp: Any, policy: Matrix, reward: Any, shares: Matrix) -> tuple[float | None, float, float]:
     """Value, None without a reward; discounted steps at odds with the oracle, at most; and all discounted steps."""
     mu = np.maximum(occupancy(mdp, policy), 0.0) * reached(mdp, lambda rows: policy[rows])[:, None]
     visits = mu.sum(axis=1)

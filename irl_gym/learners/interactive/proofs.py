@@ -16,8 +16,8 @@ class DaggerProof:
     """That were played."""
     most_rounds: int
     """That were allowed."""
-    labelled: int
-    """States in which the oracle answered."""
+    labelled: int | None
+    """States in which the oracle answered; None where they are not numbered."""
     contradicted: int
     """Of these, where it did not always answer the same."""
     steps: int | None
@@ -37,7 +37,8 @@ class DaggerProof:
 
     def facts(self) -> tuple[Fact, ...]:
         """What was asked, what is kept, and how it differs from what was answered."""
-        where = f"in {counted(self.labelled)}, over {counted(self.rounds, 'round')}"
+        states = "" if self.labelled is None else f"in {counted(self.labelled)}, "
+        where = f"{states}over {counted(self.rounds, 'round')}"
         seen = "" if self.steps is None else f" of {self.steps:,} steps"
         found = [Fact("oracle", f"asked {counted(self.queries, 'time')}, {where}{seen}")]
         if self.contradicted:

@@ -242,11 +242,13 @@ def test_a_world_that_cannot_be_stepped_is_refused(lake):
         ({"max_episode_steps": 0}, "max_episode_steps is 0"),
         ({"beta": "sudden"}, "beta is 'sudden': expected one of indicator, linear, exponential"),
         ({"noise": 1.0}, "noise is 1.0"),
-        ({"labels": "all"}, "labels is 'all': expected one of own, clean"),
+        ({"labels": "all"}, "labels is 'all': expected one of own, clean, gated"),
         ({"ask": "never"}, "ask is 'never': expected one of always, unseen"),
-        ({"learner": DAgger()}, "expected one that clones labels of states"),
-        ({"learner": "finite-lp"}, "expected one that clones labels of states"),
-        ({"learner": "neural-clone"}, "expected one that clones labels of states"),
+        ({"learner": DAgger()}, "expected one that clones labels"),
+        ({"learner": "finite-lp"}, "expected one that clones labels"),
+        ({"learner": "neural-clone"}, "episodes is None and the learner a NeuralClone"),
+        ({"learner": "neural-clone", "episodes": 2, "cost": "advantage"}, "expected one with `fit_costs`"),
+        ({"cost": "high"}, "cost is 'high': expected one of mistakes, advantage"),
     ],
 )
 def test_a_field_outside_its_range_is_refused(options, told, unchecked):

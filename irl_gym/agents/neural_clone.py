@@ -103,7 +103,10 @@ class NeuralClone:
             states, space = None, known.spaces.observations
             parts = [take(one.observations, slice(None, -1)) for one in episodes]
             seen = by_part(lambda *arrays: np.concatenate(arrays), *parts)
-        taken, lengths = np.concatenate([one.actions for one in episodes]), [len(one) for one in episodes]
+        taken, lengths = (
+            np.concatenate([one.taken(f"episode {i}") for i, one in enumerate(episodes)]),
+            [len(one) for one in episodes],
+        )
         found = self.fit(seen, taken, space, actions, lengths=lengths, rng=rng)
         return Outcome(None, found.status, found.proof, found.stats, Agent(found.policy.model, states))
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
+from irl_gym.demonstrations.inferred import Inferred
 from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.facts import Fact, Mood
 from irl_gym.features.linear_reward import LinearReward
@@ -60,6 +61,8 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
     """Of a table (S,) actions, (S, A) probabilities, or what has `predict`, whose deterministic actions a run keeps; without a
     table what has `predict`, of observations and of batches. There a run keeps agents of SB3 (`irl_gym.agents.planners.Agent`);
     any other policy is learned again where a run is continued. None of a learner of rewards alone."""
+    inferred: Inferred | None = None
+    """How the actions of demonstrations were inferred that have states alone; None where none were."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.reward, TabularReward | LinearReward | None):
@@ -87,7 +90,7 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
         proved = self.proof.facts()
         if not (isinstance(proved, tuple | list) and all(isinstance(one, Fact) for one in proved)):
             raise InvalidParameter(f"{type(self.proof).__name__}.facts() gave {proved!r:.80}: expected a tuple of `Fact`.")
-        return (told, *proved)
+        return (told, *(() if self.inferred is None else self.inferred.facts()), *proved)
 
     def proved(self) -> dict[str, Any]:
         """What a certificate keeps of the proof: its facts, the terms that are read by name, and entries of another's own."""

@@ -80,7 +80,8 @@ class NeuralClone(FitsLabels):
         known = self.needs.of(problem, self)
         episodes: Any = known.demonstrations
         parts = [take(one.observations, slice(None, -1)) for one in episodes]
-        return self.fit_labels(parts, [one.actions for one in episodes], known.spaces, rng, on_epoch)
+        taken = [one.taken(f"episode {i}") for i, one in enumerate(episodes)]
+        return self.fit_labels(parts, taken, known.spaces, rng, on_epoch)
 
     def fit(
         self, observations: Any, actions: Any, observation_space: spaces.Space, action_space: spaces.Space, *,

@@ -39,7 +39,7 @@ class Log:
     observation_columns: tuple[str, ...] = ("observation",)
     """What was seen before the action: a column, or several, the numbers of a vector."""
     action_column: str = "action"
-    """Whole numbers."""
+    """Whole numbers; none: only the states are known, and the last row of an episode is its last observation."""
     reward_column: str = "reward"
     """May be missing: no learner reads it."""
     terminated_column: str = "terminated"

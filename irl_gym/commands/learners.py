@@ -74,7 +74,8 @@ def _asked(needs: "Needs", parts: Sequence[str]) -> str:
     required = [one for part in needs.required if {*part.split(OR)} & {*parts} for one in part.split(OR) if one in parts]
     if required:
         alone = any({*part.split(OR)} <= {*parts} for part in needs.required)
-        return f"{'yes' if alone else 'or another'} ({OR.join(required)})"
+        told = {"needed": "", "inferred": "; actions inferred on a table", "not read": "; states alone"}[needs.actions]
+        return f"{'yes' if alone else 'or another'} ({OR.join(required)}{told if 'demonstrations' in required else ''})"
     return "optional" if {*needs.optional} & {*parts} else "no"
 
 

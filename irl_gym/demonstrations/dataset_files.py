@@ -19,6 +19,7 @@ import numpy as np
 from gymnasium import spaces
 from minari.dataset.minari_dataset import parse_dataset_id
 
+from irl_gym.demonstrations.minari_formats import known_actions, mask
 from irl_gym.errors import DamagedFile
 from irl_gym.files.arrow_files import check_arrow, check_parquet
 from irl_gym.files.hdf5_files import check_hdf5, read_attributes
@@ -104,8 +105,9 @@ def check_episode(episode: Any, metadata: dict[str, Any], observations: spaces.S
     if taken.dtype.kind not in "iu" or taken.ndim != 1:
         raise DamagedFile(f"{here} has actions of shape {taken.shape} and dtype {taken.dtype}, and no whole numbers (T,)")
     wrong = np.flatnonzero((taken < int(actions.start)) | (taken > int(actions.start) + int(actions.n) - 1))
-    if wrong.size:
-        raise DamagedFile(f"{here}, step {wrong[0]} has action {taken[wrong[0]]}, which is not of {actions}")
+    if wrong.size and known_actions(taken, int(actions.start)) is not None:
+        some = ": it is masked, and others are not" if taken[wrong[0]] == mask(int(actions.start)) else ""
+        raise DamagedFile(f"{here}, step {wrong[0]} has action {taken[wrong[0]]}, which is not of {actions}{some}")
     for name in ("rewards", "terminations", "truncations"):
         one = np.asarray(getattr(episode, name))
         if one.dtype.kind not in "biuf" or one.ndim != 1:

@@ -17,9 +17,9 @@ from typing import Any, get_args
 import numpy as np
 
 from irl_gym.demonstrations.choices import AfterEnd
-from irl_gym.demonstrations.minari_formats import ENDING
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter, UnknownObservation
-from irl_gym.mdp.episodes import Ending, Episode
+from irl_gym.demonstrations.minari_formats import ENDING, known_actions
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.mdp.episodes import Ending, Episode, numbered
 from irl_gym.mdp.tabular_mdp import TransitionTable
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
@@ -82,7 +82,7 @@ def episode_of(here: str, raw: Any, metadata: Mapping[str, Any], first_action: i
         )
     ended, limited = bool(terminated[steps - 1]), bool(truncated[steps - 1])
     return Episode(
-        take(raw.observations, slice(0, steps + 1)), np.asarray(raw.actions, dtype=np.int64)[:steps] - first_action, rewards,
+        take(raw.observations, slice(0, steps + 1)), known_actions(np.asarray(raw.actions)[:steps], first_action), rewards,
         ended, limited or (not ended and steps < len(raw.actions)), metadata.get("seed"), _ending(here, metadata),
     )  # fmt: skip
 
@@ -142,11 +142,7 @@ def in_table(episodes: Iterable[Episode], table: TransitionTable, states: States
         UnknownObservation: an observation that is no state of the table, with its episode.
     """
     left = 0
-    for number, episode in enumerate(episodes):
-        try:
-            rows = episode.rows(states)
-        except UnknownObservation as error:
-            raise UnknownObservation(f"episode {number}: {error}") from error
+    for number, (episode, rows) in enumerate(numbered(episodes, states)):
         ends = np.flatnonzero(table.terminal[rows[:-1]])
         if ends.size and after_end == "refuse":
             k = int(ends[0])
@@ -158,14 +154,34 @@ def in_table(episodes: Iterable[Episode], table: TransitionTable, states: States
         if ends.size and not ends[0]:
             continue
         left += 1
-        yield _until(episode, int(ends[0])) if ends.size else _followed(episode, rows, table, states)
+        known = _until(episode, int(ends[0])) if ends.size else _followed(episode, rows, table, states)
+        if known.actions is None:
+            _check_possible(number, rows[: len(known) + (known.ending != "unseen")], table, states)
+        yield known
     if not left:
         raise InvalidDemonstrations("every episode begins in an end: expected a step of one. Is it another environment's?")
 
 
+def _check_possible(number: int, rows: np.ndarray, table: TransitionTable, states: States) -> None:
+    """Check that some action of the table makes each step of an episode of states alone.
+
+    Raises:
+        InvalidDemonstrations: none does.
+    """
+    pairs = (rows[:-1, None] * table.n_actions + np.arange(table.n_actions)).ravel(), np.repeat(rows[1:], table.n_actions)
+    possible = np.asarray(table.P[pairs]).reshape(-1, table.n_actions).any(axis=1)
+    if not possible.all():
+        k = int(np.argmin(possible))
+        here, there = (states.decode(int(one)) for one in rows[k : k + 2])
+        raise InvalidDemonstrations(
+            f"episode {number}, step {k} leads from {here} to {there}, and no action of the environment does: expected a state "
+            "that follows. Leave the episode out, or cut it into two there."
+        )
+
+
 def _followed(episode: Episode, rows: np.ndarray, table: TransitionTable, states: States) -> Episode:
     """The episode with what its last action led to, where that was not recorded and can have been one state only."""
-    if episode.ending != "unseen":
+    if episode.ending != "unseen" or episode.actions is None:
         return episode
     following = table.P[[rows[-2] * table.n_actions + episode.actions[-1]]].indices
     if len(following) != 1:
@@ -178,8 +194,9 @@ def _followed(episode: Episode, rows: np.ndarray, table: TransitionTable, states
 
 def _until(episode: Episode, steps: int) -> Episode:
     """The first steps of an episode, the last of which ended it."""
+    actions = None if episode.actions is None else episode.actions[:steps]
     return replace(
-        episode, observations=take(episode.observations, slice(0, steps + 1)), actions=episode.actions[:steps],
+        episode, observations=take(episode.observations, slice(0, steps + 1)), actions=actions,
         rewards=episode.rewards[:steps], terminated=True, truncated=False, ending="seen",
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
     hdf5    data/main_data.hdf5: a group an episode, a resizable dataset a column
     arrow   data/N/part-0.arrow and data/N/metadata.json: a folder an episode, one batch of T + 1 rows
 
+Minari has no word for an action that is not known: here it is a number that is none (`mask`), for all of an episode or none.
 The layouts are Minari's own, to the byte for Arrow. Its writers would spend most of their time elsewhere: the one for Arrow
 measures the whole folder after each episode.
 Axes: T steps, N episodes.
@@ -37,13 +38,29 @@ ONE_CHUNK = 8192
 """Bytes of a column that h5py keeps in one chunk."""
 
 
+def mask(first_action: int) -> int:
+    """What stands for an action that is not known: -1, or what is below every action of a space that has negative ones."""
+    return min(first_action, 0) - 1
+
+
+def recorded_actions(episode: Episode, first_action: int) -> np.ndarray:
+    """(T,) actions as a file holds them; of an episode of states alone all are masked, by a number that is no action."""
+    masked = np.full(len(episode), mask(first_action), dtype=np.int64)
+    return masked if episode.actions is None else episode.actions + first_action
+
+
+def known_actions(recorded: np.ndarray, first_action: int) -> np.ndarray | None:
+    """(T,) actions from 0 of what a file holds; None where all are masked."""
+    return None if (recorded == mask(first_action)).all() else recorded.astype(np.int64) - first_action
+
+
 def _columns(episode: Episode, first_action: int) -> dict[str, Any]:
     """An episode in Minari's words."""
     ends = np.zeros((2, len(episode)), dtype=bool)
     ends[:, -1] = episode.terminated, episode.truncated
     return {
         "observations": episode.observations,
-        "actions": episode.actions + first_action,
+        "actions": recorded_actions(episode, first_action),
         "rewards": np.asarray(episode.rewards),
         "terminations": ends[0],
         "truncations": ends[1],

@@ -1,9 +1,9 @@
 """Episodes kept in a folder, a closed file for some at a time, so that what is written is never lost.
 
 A shard is an npz of columns, all its episodes one after the other: lengths, ends, seeds, endings (those of earlier versions
-have none), actions, rewards, and the parts of the observations. It is written beside its place and renamed. When a folder is
-opened, every shard is read against its checksums; a damaged one, and those after it, are set aside under names that end in
-`.damaged`, and their episodes are missing again.
+have none), actions (-1 where only the states are known), rewards, and the parts of the observations. It is written beside its
+place and renamed. When a folder is opened, every shard is read against its checksums; a damaged one, and those after it, are
+set aside under names that end in `.damaged`, and their episodes are missing again.
 Axes: T steps, N episodes of a shard, M = sum of T.
 """
 
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from irl_gym.demonstrations.minari_formats import known_actions, recorded_actions
 from irl_gym.errors import DamagedFile, InvalidDemonstrations, InvalidParameter
 from irl_gym.files.archives import read_arrays
 from irl_gym.files.own_files import write_arrays
@@ -67,7 +68,7 @@ class Shards:
             "truncated": np.array([one.truncated for one in episodes]),
             "endings": np.array([one.ending for one in episodes]),
             "seeds": np.array([NO_SEED if one.seed is None else one.seed for one in episodes]),
-            "actions": np.concatenate([one.actions for one in episodes]),
+            "actions": np.concatenate([recorded_actions(one, 0) for one in episodes]),
             "rewards": np.concatenate([np.asarray(one.rewards, dtype=np.float64) for one in episodes]),
         }
         parts = [dict(_parts(self.space, one.observations)) for one in episodes]
@@ -89,7 +90,7 @@ class Shards:
                 seed = int(columns["seeds"][i])
                 ending: Any = str(columns["endings"][i]) if "endings" in columns else "seen"
                 yield Episode(
-                    _joined(self.space, columns, seen), columns["actions"][steps], columns["rewards"][steps],
+                    _joined(self.space, columns, seen), known_actions(columns["actions"][steps], 0), columns["rewards"][steps],
                     bool(columns["terminated"][i]), bool(columns["truncated"][i]), None if seed == NO_SEED else seed, ending,
                 )  # fmt: skip
                 step += length

@@ -37,6 +37,7 @@ class RewardEntries(TypedDict, total=False):
 
     zero: bool
     errs: bool
+    inferred: bool
     expressible: bool
     fell_short: bool
     objective: Number | None

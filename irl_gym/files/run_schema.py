@@ -157,6 +157,7 @@ class ShownRecord(Stage, Lost):
 
     dataset_id: Text
     episodes: Count
+    states_only: NotRequired[bool]
     no_environment: NotRequired[Text]
 
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl_gym._typing import ActionSets, Vector
+from irl_gym.demonstrations.shown import shown
 from irl_gym.intervals import Interval, mean_interval
 from irl_gym.judging import measures
 from irl_gym.judging.curves import two_returns
@@ -85,12 +86,16 @@ def played(policy: Any, how: str, world: JudgingWorld, table: Tabulation | None,
 def seen(episodes: Sequence[Episode], how: str, table: Tabulation | None, gamma: float) -> tuple[Candidate, Vector]:
     """A policy that is known by episodes that were given, and (N,) their discounted returns.
 
-    They are paid by the table's reward where there is one: a log that was imported may have no rewards.
+    They are paid by the table's reward where there is one: a log that was imported may have no rewards. Episodes of states
+    alone are paid what the most likely mixture of actions earns in each.
     """
-    paid = [
-        episode.rewards if table is None else table.reward.values[episode.rows(table.states)[:-1], episode.actions]
-        for episode in episodes
-    ]
+    paid = [episode.rewards for episode in episodes]
+    if table is not None and episodes[0].actions is None:
+        of_state = (shown(episodes, table.states, table.mdp.n_actions, table.mdp).shares * table.reward.values).sum(axis=1)
+        paid = [of_state[episode.rows(table.states)[:-1]] for episode in episodes]
+    elif table is not None:
+        taken = [episode.taken(f"episode {number}") for number, episode in enumerate(episodes)]
+        paid = [table.reward.values[one.rows(table.states)[:-1], a] for one, a in zip(episodes, taken, strict=True)]
     earned = np.array([[gamma ** np.arange(len(one)) @ one, one.sum()] for one in paid])
     return Candidate(None, how, float(earned[:, 0].mean()), mean_interval(earned[:, 1])), earned[:, 0]
 
@@ -174,12 +179,12 @@ def without_chance(episodes: Sequence[Episode], table: Tabulation | None) -> boo
     if table is None or not table.evidence.exact:
         return False
     mdp, first = table.mdp, episodes[0]
-    rows = first.rows(table.states)
-    if any(
-        not (np.array_equal(one.rows(table.states), rows) and np.array_equal(one.actions, first.actions)) for one in episodes
-    ):
+    rows, actions = first.rows(table.states), first.actions
+    if actions is None:  # then other actions may have made the same steps
         return False
-    taken = mdp.P[rows[:-1] * mdp.n_actions + first.actions]
+    if any(not (np.array_equal(one.rows(table.states), rows) and np.array_equal(one.actions, actions)) for one in episodes):
+        return False
+    taken = mdp.P[rows[:-1] * mdp.n_actions + actions]
     return np.count_nonzero(mdp.d0) == 1 and int((taken > 0).sum(axis=1).max(initial=0)) <= 1
 
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
+from irl_gym.demonstrations.inferred import Inferred
 from irl_gym.errors import InvalidParameter, InvalidReward, a_type
 from irl_gym.facts import Fact, Mood
 from irl_gym.features.linear_reward import LinearReward
@@ -63,6 +64,8 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
     labelled: Any = None
     """Of a learner that asks, the episodes in which it did, if there were some (`LabelledEpisode`); a run keeps them as a
     Minari dataset, and so does `irl_gym.learners.interactive.labelled.write_labelled`."""
+    inferred: Inferred | None = None
+    """How the actions of demonstrations were inferred that have states alone; None where none were."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.reward, TabularReward | LinearReward | None):
@@ -90,7 +93,7 @@ class Outcome(Record, Generic[AnyReward, AnyProof]):
         proved = self.proof.facts()
         if not (isinstance(proved, tuple | list) and all(isinstance(one, Fact) for one in proved)):
             raise InvalidParameter(f"{type(self.proof).__name__}.facts() gave {proved!r:.80}: expected a tuple of `Fact`.")
-        return (told, *proved)
+        return (told, *(() if self.inferred is None else self.inferred.facts()), *proved)
 
     def proved(self) -> dict[str, Any]:
         """What a certificate keeps of the proof: its facts, the terms that are read by name, and entries of another's own."""

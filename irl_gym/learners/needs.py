@@ -6,7 +6,8 @@
     oracle pi*                   no         no         yes              oracle
     reward R                     no         optional   optional         reward
 Who needs an oracle is interactive, who needs an environment or its dynamics active, who needs neither passive. A reward that is
-required moves nobody: Table 1 has no column for who reads it and needs no environment.
+required moves nobody: Table 1 has no column for who reads it and needs no environment. Demonstrations are sequences of states,
+or of states and actions (lecture notes 2.1.2): `actions` says whether a learner can do with the first.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -15,6 +16,8 @@ from typing import Any, Literal, get_args
 
 from irl_gym.errors import InvalidParameter, MissingPart
 from irl_gym.learners.problem import Problem
+from irl_gym.mdp.episodes import Episode
+from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.records import Record
 
 Column = Literal["passive", "active", "interactive"]
@@ -22,6 +25,7 @@ Part = Literal[
     "demonstrations", "expert", "environment", "oracle", "dynamics", "reward", "features", "gamma", "horizon", "also"
 ]
 PARTS: tuple[str, ...] = get_args(Part)
+OfActions = Literal["needed", "inferred", "not read"]
 OR = " or "
 
 TO_GET = {
@@ -51,8 +55,12 @@ class Needs(Record):
     """Parts without which nothing is learned; of "expert or demonstrations" one is enough, the first that there is is read."""
     optional: tuple[str, ...] = ()
     """Parts that are read where there are some."""
+    actions: OfActions = "needed"
+    """Those of the demonstrations: needed; inferred where they are missing, if the dynamics are a table; or never read."""
 
     def __post_init__(self) -> None:
+        if self.actions not in get_args(OfActions):
+            raise InvalidParameter(f"actions are {self.actions!r:.60}: expected one of {', '.join(get_args(OfActions))}.")
         for one in self.parts:
             if one not in PARTS:
                 raise InvalidParameter(f"a learner needs {one!r}: expected one of {', '.join(PARTS)}, or two joined by 'or'.")
@@ -104,6 +112,7 @@ class Needs(Record):
 
         Raises:
             MissingPart: it lacks a part that is required.
+            InvalidDemonstrations: episodes without actions, where these are needed.
         """
         given = {one for one in PARTS if not _absent(getattr(problem, one))} | ({"gamma"} if problem.discount else set())
         if (lacks := self.lacking(given)) is not None:
@@ -111,7 +120,24 @@ class Needs(Record):
             raise MissingPart(f"{type(learner).__name__} needs {lacks}, and the problem has {_listed(given)}: expected {how}.")
         later = {one for part in self.required for one in [one for one in part.split(OR) if one in given][1:]}
         kept = {} if "gamma" in self.unused else {"gamma": problem.discount}
-        return replace(problem, **{one: () if one == "also" else None for one in (*self.unused, *later)}, **kept)
+        found = replace(problem, **{one: () if one == "also" else None for one in (*self.unused, *later)}, **kept)
+        return self.with_actions(found, learner)
+
+    def with_actions(self, problem: Problem, learner: Any) -> Problem:
+        """A problem without unused parts, checked: its episodes have actions where the learner cannot do without.
+
+        Of episodes that are read from files as they are asked for, the first is looked at.
+
+        Raises:
+            InvalidDemonstrations: one has none; it is named.
+        """
+        given: Any = problem.demonstrations or ()
+        if self.actions == "not read" or (self.actions == "inferred" and isinstance(problem.dynamics, TabularMDP)):
+            return problem
+        for number, one in enumerate(given if isinstance(given, list | tuple) else given[:1]):
+            if isinstance(one, Episode):
+                one.taken(f"{type(learner).__name__} needs actions, and episode {number}")
+        return problem
 
 
 def _absent(part: Any) -> bool:

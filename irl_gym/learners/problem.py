@@ -1,6 +1,6 @@
 """What is known of an expert and a world: A_IL: <D*, pi*, T, R> -> pi (lecture notes 2.1.2), each part optional.
 
-    demonstrations   D*, the expert's episodes
+    demonstrations   D*, the expert's episodes, with their actions or of states alone
     expert           its policy, known in advance: the complete policy of Ng & Russell's section 3, NaN where it is not known
     oracle           pi* that may be asked, and counts how often
     environment      a world that can be run; with a planner, solved for a reward
@@ -22,7 +22,8 @@ from gymnasium import spaces
 
 from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
-from irl_gym.demonstrations.demonstrated import most_frequent, visits
+from irl_gym.demonstrations.inferred import Inferred
+from irl_gym.demonstrations.shown import Shown, shown
 from irl_gym.environments.generative import GenerativeModel
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, MissingPart, a_type
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
@@ -235,11 +236,26 @@ class Problem(Record):
         """How often the episodes take each action in each state. Ask only where there are episodes and states are numbered.
 
         Raises:
-            InvalidDemonstrations, UnknownObservation: episodes of other spaces.
+            InvalidDemonstrations, UnknownObservation: episodes of other spaces, or without actions.
         """
         assert self.demonstrations is not None
+        return empirical_policy(self.demonstrations, *self._numbered)
+
+    @cached_property
+    def shown(self) -> Shown:
+        """The same, and what they do most; of episodes of states alone as a table tells (`irl_gym.demonstrations.inferred`).
+
+        Raises:
+            InvalidDemonstrations, UnknownObservation: episodes of other spaces, or without actions where there is no table.
+        """
+        assert self.demonstrations is not None
+        return shown(self.demonstrations, *self._numbered, self.dynamics if isinstance(self.dynamics, TabularMDP) else None)
+
+    @property
+    def _numbered(self) -> tuple[States, int]:
+        """The numbering of states, and A."""
         actions: Any = self.spaces.actions
-        return empirical_policy(self.demonstrations, self.spaces.states or StateIndex(self.spaces.observations), int(actions.n))
+        return self.spaces.states or StateIndex(self.spaces.observations), int(actions.n)
 
     @property
     def policy(self) -> Any:
@@ -248,9 +264,14 @@ class Problem(Record):
             return self.expert
         if self.demonstrations is None:
             raise MissingPart("the problem has neither expert nor demonstrations: expected one of them.")
-        return most_frequent(self.seen)
+        return self.shown.policy
+
+    @property
+    def inferred(self) -> Inferred | None:
+        """How actions were inferred; None where `policy` rests on none that were."""
+        return self.shown.inferred if self.expert is None and self.demonstrations is not None else None
 
     @property
     def visits(self) -> Vector | None:
         """(S,) how often the episodes visit each state, where they are all that is known of the expert; else None."""
-        return visits(self.seen) if self.expert is None and self.demonstrations is not None else None
+        return self.shown.visits if self.expert is None and self.demonstrations is not None else None

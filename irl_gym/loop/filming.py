@@ -43,7 +43,8 @@ class _Take:
     """An episode that was run, with pictures as the environment draws them."""
 
     observations: list[Any]
-    actions: list[int] = field(default_factory=list)
+    actions: list[int | None] = field(default_factory=list)
+    """None where they were not recorded."""
     rewards: list[float] = field(default_factory=list)
     ends: str = "cut"
     pictures: dict[int, np.ndarray] = field(default_factory=dict)
@@ -163,12 +164,15 @@ def _replayed(env: gym.Env, episode: Episode, without: str | None) -> _Take:
     n = min(len(episode), MOST_STEPS)
     shown = [take(episode.observations, t) for t in range(n + 1)]
     ends = "cut" if n < len(episode) else "terminated" if episode.terminated else "truncated"
-    given = _Take(shown, episode.actions[:n].tolist(), np.asarray(episode.rewards, dtype=float)[:n].tolist(), ends)
+    actions: list[Any] = [None] * n if episode.actions is None else episode.actions[:n].tolist()
+    given = _Take(shown, actions, np.asarray(episode.rewards, dtype=float)[:n].tolist(), ends)
+    if without is None and episode.actions is None:
+        without = "the dataset does not say which actions were taken"
     if without is None and episode.seed is None:
         without = "the dataset does not say with which seed the episode was recorded"
     if without is None:
-        actions = iter(given.actions)
-        again = _run(env, lambda _: next(actions), episode.seed, n, None)
+        replayed = iter(actions)
+        again = _run(env, lambda _: next(replayed), episode.seed, n, None)
         same = len(again.observations) == len(shown) and all(map(_equal, again.observations, shown))
         if same:
             given.pictures, without = again.pictures, again.without
@@ -203,7 +207,7 @@ def _developed(
         action, paid = made.actions[time - 1], learned[time - 1]
         moments.append(
             Moment(
-                texts[time], rows[time], action, actions[action], made.rewards[time - 1],
+                texts[time], rows[time], action, None if action is None else actions[action], made.rewards[time - 1],
                 None if np.isnan(paid) else float(paid), true_total, learned_total, numbers.get(time),
             )
         )  # fmt: skip

@@ -27,7 +27,7 @@ import gymnasium as gym
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import read_minari
-from irl_gym.demonstrations.demonstrated import most_frequent
+from irl_gym.demonstrations.shown import Shown
 from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.facts import counted
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
@@ -41,7 +41,7 @@ from irl_gym.loop.makers import MAKERS
 from irl_gym.loop.stages import REWARD, OnProgress
 from irl_gym.loop.world_choice import place_of
 from irl_gym.loop.worlds import RunWorld
-from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
+from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.experiment import Experiment, as_config
@@ -187,14 +187,14 @@ class Loop:
         return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.path / "dataset"))
 
     @cached_property
-    def seen(self) -> EmpiricalPolicy | None:
+    def seen(self) -> Shown | None:
         """What the episodes show of the expert in the table; None where a learner is given its whole policy."""
         return self.world.seen(self.demonstrations) if self.experiment.from_episodes else None
 
     @cached_property
     def problem(self) -> Problem:
         """What the learner is given of all that is known: the parts that it needs. Nothing else is worked out."""
-        asked, world = self.experiment, self.world
+        asked, world, needs = self.experiment, self.world, self.experiment.learner.needs
         parts: dict[str, Callable[[], Any]] = {
             "demonstrations": lambda: self.demonstrations,
             "expert": lambda: None if asked.from_episodes else self.expert,
@@ -207,13 +207,13 @@ class Loop:
             "horizon": lambda: world.horizon,
             "also": lambda: (),
         }
-        known = asked.learner.needs.worked_out(parts)
-        return Problem(Spaces(self.env.observation_space, self.env.action_space, world.states), **known)
+        problem = Problem(Spaces(self.env.observation_space, self.env.action_space, world.states), **needs.worked_out(parts))
+        return needs.with_actions(problem, asked.learner)
 
     @property
     def known_expert(self) -> Any:
         """What a learner of tables is given of the expert: its policy, or the most frequent actions, NaN where not seen."""
-        return self.expert if self.seen is None else most_frequent(self.seen)
+        return self.expert if self.seen is None else self.seen.policy
 
     @cached_property
     def outcome(self) -> Outcome:

@@ -18,9 +18,9 @@ from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import SB3, Agent, Planner
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.datasets import load_minari, write_minari
-from irl_gym.demonstrations.demonstrated import most_frequent
 from irl_gym.demonstrations.endings import left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
+from irl_gym.demonstrations.shown import Shown
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward, IrlGymError
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
@@ -34,7 +34,7 @@ from irl_gym.learners.interactive.labelled import write_labelled
 from irl_gym.learners.problem import Problem
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.worlds import RunWorld
-from irl_gym.mdp.episodes import EmpiricalPolicy, Episode
+from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.policies import Policy
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
@@ -87,12 +87,13 @@ def planned_expert(
     return {"planner": type(teacher).__name__, "how": how_of(teacher), **made}
 
 
-def recorded_expert(folder: Path, dataset: str, seen: EmpiricalPolicy | None) -> dict[str, Any]:
+def recorded_expert(folder: Path, dataset: str, seen: Shown | None) -> dict[str, Any]:
     """What a dataset shows of an expert, in the states of a table."""
     if seen is None:
         return {"planner": "unknown: the dataset's"}
-    np.savez(folder / "expert.npz", actions=most_frequent(seen))
-    return {"planner": "most frequent action of the dataset", "states_seen": int(seen.visited.sum())}
+    np.savez(folder / "expert.npz", actions=seen.policy)
+    planner = f"most {'frequent' if seen.inferred is None else 'likely'} action of the dataset"
+    return {"planner": planner, "states_seen": int((seen.visits > 0).sum())}
 
 
 def recorded_episodes(
@@ -101,6 +102,8 @@ def recorded_episodes(
     """The episodes of a dataset, which stays where it is."""
     taken = sum(map(len, demonstrations))
     recorded = {"dataset_id": dataset, "episodes": len(demonstrations), "steps_recorded": taken}
+    if any(one.actions is None for one in demonstrations):
+        recorded["states_only"] = True
     steps = load_minari(dataset, root=dataset_root).total_steps if after_end == "cut" else None
     return recorded | left_out(given, demonstrations, steps)
 

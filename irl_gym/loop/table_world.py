@@ -15,6 +15,7 @@ from irl_gym.agents.noise import noisy
 from irl_gym.agents.planners import FOR_ADVANTAGES, SB3, Agent, Planner, ValueIteration, tabular_actions
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.endings import in_table
+from irl_gym.demonstrations.shown import Shown, shown
 from irl_gym.environments.rollouts import run_episodes
 from irl_gym.environments.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.errors import UnknownObservation
@@ -26,7 +27,7 @@ from irl_gym.learners.base import Outcome
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.cloning.proofs import CloneProof
 from irl_gym.learners.problem import Problem
-from irl_gym.mdp.episodes import EmpiricalPolicy, Episode, collect, collect_from_table, empirical_policy
+from irl_gym.mdp.episodes import Episode, collect, collect_from_table
 from irl_gym.mdp.policies import Policy, TabularPolicy, as_distribution, load_actions
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
@@ -134,7 +135,7 @@ class TableWorld:
         self,
         reward: TabularReward | LinearReward | None,
         observations: Sequence[Any],
-        actions: Sequence[int],
+        actions: Sequence[int | None],
         *,
         terminated: bool,
     ) -> tuple[list[int | None], np.ndarray]:  # fmt: skip
@@ -144,7 +145,8 @@ class TableWorld:
         if reward is None:
             return rows, np.full(len(actions), np.nan)
         paid, steps = self.tabular(reward), zip(rows, actions, rows[1:], strict=False)
-        return rows, np.array([np.nan if s is None or t is None else float(paid.pay(s, a, t)) for s, a, t in steps])
+        read = (0, 2) if paid.on_states else (0, 1, 2)
+        return rows, np.array([np.nan if None in [one[i] for i in read] else float(paid.pay(*one)) for one in steps])
 
     def _row(self, observation: Any, *, terminated: bool) -> int | None:
         try:
@@ -193,9 +195,9 @@ class TableWorld:
         """Recorded episodes as an exact table knows them."""
         return list(in_table(episodes, self.mdp, self.states, after_end)) if self.table.evidence.exact else episodes
 
-    def seen(self, episodes: list[Episode]) -> EmpiricalPolicy:
-        """How often each action was taken in each state."""
-        return empirical_policy(episodes, self.states, self.mdp.n_actions)
+    def seen(self, episodes: list[Episode]) -> Shown:
+        """How often each action was taken in each state, as recorded, or as the table tells of states alone."""
+        return shown(episodes, self.states, self.mdp.n_actions, self.mdp)
 
     def chooser(self, policy: Any, seed: int) -> Choose:
         """What acts as in the episodes that judge a policy."""

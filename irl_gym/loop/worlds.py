@@ -115,7 +115,7 @@ class SteppedWorld:
         self,
         reward: TabularReward | LinearReward | None,
         observations: Sequence[Any],
-        actions: Sequence[int],
+        actions: Sequence[int | None],
         *,
         terminated: bool,
     ) -> tuple[list[int | None], np.ndarray]:

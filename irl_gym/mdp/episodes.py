@@ -2,6 +2,7 @@
 
 An episode of T steps has T + 1 observations, T actions, T rewards, and ends by `terminated` or `truncated`. Where nobody wrote
 down what the last action led to, `ending` says so: the pair counts for the policy, and nothing is made of its successor.
+Actions may be missing, all of an episode or none: who cannot do without asks for them by `taken`, and none is ever made up.
 Axes: S states, A actions, K features, T steps, N episodes.
 """
 
@@ -12,17 +13,22 @@ from typing import Any, Literal, get_args
 import gymnasium as gym
 import numpy as np
 
-from irl_gym._typing import Matrix, StateMask
+from irl_gym._typing import StateMask
 from irl_gym.checks import checked_number
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, InvalidPolicy, UnknownObservation, a_type
 from irl_gym.mdp.policies import Policy, as_distribution
-from irl_gym.mdp.sampling import Successors
+from irl_gym.mdp.sampling import walks
 from irl_gym.mdp.tabular_mdp import TransitionTable
 from irl_gym.records import Record
 from irl_gym.spaces.batches import batch_sizes, by_part, take
 from irl_gym.spaces.states import States
 
 Ending = Literal["seen", "unseen", "followed", "dropped"]
+WITHOUT_ACTIONS = (
+    "Record the actions too; or learn from states alone, where the table is known with FiniteLP, FeatureLP or Clone, else with "
+    "TrajectoryLP."
+)
+"""What can be done with an episode without actions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +41,8 @@ class Episode(Record):
 
     observations: Any
     """T + 1 observations, stacked as vector environments stack them."""
-    actions: np.ndarray
-    """(T,) integers from 0, whatever number the action space starts at."""
+    actions: np.ndarray | None
+    """(T,) integers from 0, whatever number the action space starts at; None where only the states are known."""
     rewards: np.ndarray
     """(T,) what the environment paid."""
     terminated: bool
@@ -51,13 +57,7 @@ class Episode(Record):
     action, taken in the last observation, was recorded and is left out."""
 
     def __post_init__(self) -> None:
-        actions = np.asarray(self.actions)
-        if actions.ndim != 1 or (actions.size and actions.dtype.kind not in "iu"):
-            raise InvalidDemonstrations(
-                f"an episode's actions have shape {actions.shape} and dtype {actions.dtype}: expected (T,) integers."
-            )
-        object.__setattr__(self, "actions", actions)
-        steps = len(actions)
+        steps = len(self.rewards) if self.actions is None else self._checked_actions()
         if steps == 0 or len(self.rewards) != steps:
             raise InvalidDemonstrations(
                 f"an episode has {steps} actions and {len(self.rewards)} rewards: expected as many rewards as actions, and "
@@ -78,8 +78,30 @@ class Episode(Record):
         if self.ending not in get_args(Ending):
             raise InvalidDemonstrations(f"ending is {self.ending!r}: expected one of {', '.join(get_args(Ending))}.")
 
+    def _checked_actions(self) -> int:
+        actions = np.asarray(self.actions)
+        if actions.ndim != 1 or (actions.size and actions.dtype.kind not in "iu"):
+            raise InvalidDemonstrations(
+                f"an episode's actions have shape {actions.shape} and dtype {actions.dtype}: expected (T,) integers."
+            )
+        object.__setattr__(self, "actions", actions)
+        return len(actions)
+
     def __len__(self) -> int:
-        return len(self.actions)
+        return len(self.rewards)
+
+    def taken(self, who: str) -> np.ndarray:
+        """(T,) the actions, for who cannot do without.
+
+        Args:
+            who: the episode as an error calls it, and who needs its actions.
+
+        Raises:
+            InvalidDemonstrations: it has none.
+        """
+        if self.actions is None:
+            raise InvalidDemonstrations(f"{who} has only states: expected an action a step. {WITHOUT_ACTIONS}")
+        return self.actions
 
     @property
     def total_reward(self) -> float:
@@ -109,11 +131,31 @@ class Episode(Record):
             return self
         if len(self) == 1:
             return None
-        known = take(self.observations, slice(None, -1))
+        known, actions = take(self.observations, slice(None, -1)), None if self.actions is None else self.actions[:-1]
         return replace(
-            self, observations=known, actions=self.actions[:-1], rewards=self.rewards[:-1], terminated=False, truncated=True,
+            self, observations=known, actions=actions, rewards=self.rewards[:-1], terminated=False, truncated=True,
             ending="dropped",
         )  # fmt: skip
+
+
+def numbered(episodes: Iterable[Episode], states: States) -> Iterator[tuple[Episode, np.ndarray]]:
+    """Each episode with the rows (T+1,) that it visits.
+
+    Raises:
+        InvalidDemonstrations: something else than an episode.
+        UnknownObservation: an observation that the index does not hold, naming the episode.
+    """
+    for number, episode in enumerate(episodes):
+        if not isinstance(episode, Episode):
+            raise InvalidDemonstrations(
+                f"episode {number} is {a_type(episode)}: expected an Episode. Read Minari datasets with "
+                "`read_minari(dataset)`, and other data with `irl_gym.demonstrations.imports`."
+            )
+        try:
+            rows = episode.rows(states)
+        except UnknownObservation as error:
+            raise UnknownObservation(f"episode {number}: {error}") from error
+        yield episode, rows
 
 
 def seen_parts(episodes: Iterable[Episode]) -> list[Episode]:
@@ -215,40 +257,17 @@ def collect_from_table(
     """
     _check_count(n_episodes, max_episode_steps)
     distribution = as_distribution(policy, table.n_states, table.n_actions)
-    return _drawn(table, entry_rewards, states, distribution, n_episodes, seed, max_episode_steps)
-
-
-def _drawn(
-    table: TransitionTable, paid: np.ndarray, states: States, policy: Matrix, n_episodes: int, seed: int, most: int
-) -> Iterator[Episode]:
-    rng = np.random.default_rng(seed)
-    cumulated = policy.cumsum(axis=1)
-    successors = Successors(table)
-    rows = np.full((n_episodes, most + 1), -1, dtype=np.int64)
-    actions = np.zeros((n_episodes, most), dtype=np.int64)
-    rewards = np.zeros((n_episodes, most))
-    length = np.zeros(n_episodes, dtype=np.int64)
-    rows[:, 0] = successors.start(n_episodes, rng)
-    going = np.arange(n_episodes)
-    for t in range(most):
-        if not going.size:
-            break
-        here = rows[going, t]
-        draws = rng.random((going.size, 1))
-        actions[going, t] = np.minimum((draws >= cumulated[here]).sum(axis=1), table.n_actions - 1)
-        entries = successors.entries(here, actions[going, t], rng)
-        rows[going, t + 1] = table.P.indices[entries]
-        rewards[going, t] = paid[entries]
-        length[going] = t + 1
-        going = going[~table.terminal[rows[going, t + 1]]]
-    for i, n in enumerate(length.tolist()):
-        ended = bool(table.terminal[rows[i, n]])
-        yield Episode(states.decode_batch(rows[i, : n + 1]), actions[i, :n], rewards[i, :n], ended, not ended)
+    rows, actions, entries, lengths = walks(table, distribution, n_episodes, max_episode_steps, np.random.default_rng(seed))
+    ended = table.terminal[rows[np.arange(n_episodes), lengths]].tolist()
+    return (
+        Episode(states.decode_batch(rows[i, : n + 1]), actions[i, :n], entry_rewards[entries[i, :n]], ended[i], not ended[i])
+        for i, n in enumerate(lengths.tolist())
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalPolicy(Record):
-    """What episodes say about the policy that made them, and where they say nothing."""
+    """What episodes say about the policy that made them; `irl_gym.demonstrations.demonstrated` makes tables of it."""
 
     counts: np.ndarray
     """(S, A) int64, how often each action was taken in each state."""
@@ -258,19 +277,13 @@ class EmpiricalPolicy(Record):
         """(S,) states in which at least one action was seen."""
         return self.counts.sum(axis=1) > 0
 
-    @property
-    def probabilities(self) -> Matrix:
-        """(S, A) maximum-likelihood probabilities; NaN in states never visited, about which the data say nothing."""
-        total = self.counts.sum(axis=1, keepdims=True)
-        return np.divide(self.counts, total, out=np.full(self.counts.shape, np.nan), where=total > 0)
-
 
 def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int) -> EmpiricalPolicy:
     """Count the actions taken in each state.
 
     Raises:
         InvalidParameter: states or a number of actions that are none.
-        InvalidDemonstrations: an action out of range, naming episode and step; or no episode.
+        InvalidDemonstrations: an action out of range, naming episode and step; an episode without actions; or no episode.
         UnknownObservation: an observation that the index does not hold, naming the episode.
     """
     if not isinstance(states, States):
@@ -278,22 +291,14 @@ def empirical_policy(episodes: Iterable[Episode], states: States, n_actions: int
     checked_number("n_actions", n_actions, "a whole number of at least 1, such as `table.mdp.n_actions`", least=1, whole=True)
     counts = np.zeros((states.n_states, n_actions), dtype=np.int64)
     number = -1
-    for number, episode in enumerate(episodes):
-        if not isinstance(episode, Episode):
-            raise InvalidDemonstrations(
-                f"episode {number} is {a_type(episode)}: expected an Episode. Read Minari datasets with "
-                "`read_minari(dataset)`, and other data with `irl_gym.demonstrations.imports`."
-            )
-        wrong = np.flatnonzero((episode.actions < 0) | (episode.actions >= n_actions))
+    for number, (episode, rows) in enumerate(numbered(episodes, states)):
+        actions = episode.taken(f"episode {number}")
+        wrong = np.flatnonzero((actions < 0) | (actions >= n_actions))
         if wrong.size:
             raise InvalidDemonstrations(
-                f"episode {number}, step {wrong[0]} takes action {episode.actions[wrong[0]]}: expected 0 to {n_actions - 1}."
+                f"episode {number}, step {wrong[0]} takes action {actions[wrong[0]]}: expected 0 to {n_actions - 1}."
             )
-        try:
-            rows = episode.rows(states)
-        except UnknownObservation as error:
-            raise UnknownObservation(f"episode {number}: {error}") from error
-        np.add.at(counts, (rows[:-1], episode.actions), 1)
+        np.add.at(counts, (rows[:-1], actions), 1)
     if number < 0:
         raise InvalidDemonstrations("there are no episodes: expected at least one.")
     return EmpiricalPolicy(counts)

@@ -6,6 +6,7 @@ row i with a uniform draw u is found by one binary search for i + u.
 
 import numpy as np
 
+from irl_gym._typing import Matrix
 from irl_gym.errors import InvalidMDP
 from irl_gym.mdp.tabular_mdp import TransitionTable
 
@@ -58,3 +59,38 @@ class Successors:
             return np.full(n, self._starts[0])
         found = np.searchsorted(self._start_cumulated, rng.random(n), side="right")
         return self._starts[np.minimum(found, self._starts.size - 1)]
+
+
+def walks(
+    table: TransitionTable, policy: Matrix, n: int, most: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Walks of a policy, all at once, each until it ends or has `most` steps.
+
+    Args:
+        table: P and d0.
+        policy: (S, A) probabilities.
+        n: how many.
+        most: steps of the longest.
+        rng: of what is drawn.
+
+    Returns:
+        (n, most + 1) states; (n, most) actions, and positions of the transitions in P.data; and (n,) steps of each walk, beyond
+        which nothing is meant.
+    """
+    cumulated, successors = policy.cumsum(axis=1), Successors(table)
+    rows = np.full((n, most + 1), -1, dtype=np.int64)
+    actions, entries = np.zeros((2, n, most), dtype=np.int64)
+    length = np.zeros(n, dtype=np.int64)
+    rows[:, 0] = successors.start(n, rng)
+    going = np.arange(n)
+    for t in range(most):
+        if not going.size:
+            break
+        here = rows[going, t]
+        draws = rng.random((going.size, 1))
+        actions[going, t] = np.minimum((draws >= cumulated[here]).sum(axis=1), table.n_actions - 1)
+        entries[going, t] = successors.entries(here, actions[going, t], rng)
+        rows[going, t + 1] = table.P.indices[entries[going, t]]
+        length[going] = t + 1
+        going = going[~table.terminal[rows[going, t + 1]]]
+    return rows, actions, entries, length

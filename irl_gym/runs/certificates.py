@@ -20,6 +20,7 @@ from irl_gym.mdp.sampling_error import ESTIMATED
 from irl_gym.tables.tabulation import Tabulation
 
 FREQUENT = Fact("taken for the expert's", "the actions most frequent in its episodes")
+LIKELY = Fact("taken for the expert's", "the most likely actions, inferred from the states of its episodes")
 ESTIMATE = Fact("judged on", ESTIMATED, "open")
 
 
@@ -38,7 +39,7 @@ def certificate_of(result: Outcome, known: tuple[Tabulation, Any] | None, *, epi
     table, expert = known
     reward = result.reward.tabular(table.states)
     found = certified(table, expert, reward, episodes=episodes)
-    return {"optimality": optimality_told(found, table), "proof": proof}
+    return {"optimality": optimality_told(found, table, inferred=result.inferred is not None), "proof": proof}
 
 
 def certified(table: Tabulation, expert: Any, reward: TabularReward, *, episodes: bool) -> Optimality:
@@ -56,13 +57,20 @@ def certified(table: Tabulation, expert: Any, reward: TabularReward, *, episodes
     return certify(table.mdp, expert, reward, errs=episodes)
 
 
-def optimality_told(found: Optimality, table: Tabulation) -> dict[str, Any]:
-    """The same as json holds it, with what a run knows besides: who is judged, and on which table."""
-    more = (FREQUENT,) if found.errs else ()
+def optimality_told(found: Optimality, table: Tabulation, *, inferred: bool) -> dict[str, Any]:
+    """The same as json holds it, with what a run knows besides: who is judged, and on which table.
+
+    Args:
+        found: what the reward says of the expert.
+        table: the run's.
+        inferred: were the expert's actions inferred from states?
+    """
+    more = (LIKELY if inferred else FREQUENT,) if found.errs else ()
     if not table.evidence.exact and found.sampling_error is None:
         more += (ESTIMATE,)
     first, *others = found.facts()
-    return {**found.to_json(), "facts": [one.to_json() for one in (first, *more, *others)]}
+    facts = [one.to_json() for one in (first, *more, *others)]
+    return {**found.to_json(), **({"inferred": True} if inferred else {}), "facts": facts}
 
 
 def read_certificate(path: Path) -> dict[str, Any]:

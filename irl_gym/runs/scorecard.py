@@ -137,8 +137,9 @@ def came_about(config: Mapping[str, Any], stages: Mapping[str, Mapping[str, Any]
     n = stages["demonstrations"].get("episodes")
     noise = f", with a random action at probability {config['epsilon']:g}" if config.get("epsilon") else ""
     given = config.get("dataset") is not None
+    alone = ", of states alone" if stages["demonstrations"].get("states_only") else ""
     return {
-        EXPERT: f"known by {n:,} episode{'s' * (n != 1)} of the dataset" if given else f"{made}{noise}",
+        EXPERT: f"known by {n:,} episode{'s' * (n != 1)} of the dataset{alone}" if given else f"{made}{noise}",
         RANDOM: "uniformly random actions",
         CLONE: cloned,
         LEARNED: learned,

@@ -89,7 +89,7 @@ def _rows(table: Tabulation, episode: Episode) -> tuple[np.ndarray, np.ndarray, 
     except UnknownObservation:
         rows = np.array([_row(table, take(episode.observations, np.array([i])), end) for i, end in enumerate(ended)])
     rows = np.where((rows != UNKNOWN) & (table.mdp.terminal[rows] != ended), UNKNOWN, rows)
-    return rows, episode.actions, np.asarray(episode.rewards, dtype=np.float64)
+    return rows, episode.taken("a fresh episode"), np.asarray(episode.rewards, dtype=np.float64)
 
 
 def _row(table: Tabulation, observation: Any, ended: bool) -> int:

@@ -35,8 +35,8 @@ def lake(**arguments):
 
 
 def one(observations=(0, 4, 8), actions=(1, 1), rewards=None, terminated=False):
-    paid = np.zeros(len(actions)) if rewards is None else np.array(rewards)
-    return Episode(np.array(observations), np.array(actions), paid, terminated, not terminated)
+    paid = np.zeros(len(observations) - 1) if rewards is None else np.array(rewards)
+    return Episode(np.array(observations), None if actions is None else np.array(actions), paid, terminated, not terminated)
 
 
 def write(root, *episodes, name=ID, env=None, **more):
@@ -145,6 +145,7 @@ def paid_nan(root):
 
 TABLE = tabulate(lake(), gamma=0.9)
 LONG = one([0] * (LONGEST_ARROW + 1), [0] * LONGEST_ARROW)
+JUMPS = one((0, 4, 9, 10), None)
 IN_AN_END = [one([0, 4, 5, 5], [1, 2, 2])]
 
 
@@ -223,6 +224,12 @@ CASES = [
      lambda _: list(in_table(IN_AN_END, TABLE.mdp, TABLE.states, "refuse")),
      lambda _: list(in_table(IN_AN_END, TABLE.mdp, TABLE.states, "cut"))),
     # demonstrations
+    ("Leave the episode out,",
+     lambda _: list(in_table([JUMPS], TABLE.mdp, TABLE.states, "refuse")),
+     lambda _: list(in_table([one(actions=None)], TABLE.mdp, TABLE.states, "refuse"))),
+    ("or cut it into two there.",
+     lambda _: list(in_table([JUMPS], TABLE.mdp, TABLE.states, "refuse")),
+     lambda _: list(in_table([one((0, 4), None), one((9, 10), None)], TABLE.mdp, TABLE.states, "refuse"))),
     ("Read Minari datasets with `read_minari(dataset)`,",
      lambda root: empirical_policy(load_minari(ID, root=root), SIXTEEN, 4),
      lambda root: empirical_policy(read_minari(load_minari(ID, root=root)), SIXTEEN, 4)),

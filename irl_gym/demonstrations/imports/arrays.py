@@ -12,10 +12,12 @@ from gymnasium import spaces
 
 from irl_gym.demonstrations.choices import Last
 from irl_gym.demonstrations.imports.cutting import FLAGS, counts_of, cut, depth, from_lists, from_padded, offsets_at, offsets_of
+from irl_gym.demonstrations.imports.members import members
 from irl_gym.demonstrations.imports.reading import Reading, reading
 from irl_gym.demonstrations.imports.values import as_array, first_part, is_list, numbers
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.mdp.episodes import Episode
+from irl_gym.spaces.batches import batch_size
 
 
 def from_arrays(
@@ -40,6 +42,7 @@ def from_arrays(
     *An array an episode*, of any lengths: `actions[i]` is (T_i,) and `observations[i]` holds T_i + 1 or T_i of them.
 
         from_arrays([[0, 4, 8], [0, 1]], [[1, 1], [2]], terminated=[True, False], env=env)
+        from_arrays([[0, 4, 8], [0, 1]], None, env=env)     # of the states alone
 
     *One long array*: `actions` is (n,), `observations` holds n or n + N, and one of `ends` ((n,) booleans, true in the last
     step of an episode), `lengths` ((N,) steps) or `episode` ((n,) ids, equal within an episode) says where to cut. Without
@@ -50,9 +53,12 @@ def from_arrays(
     *Padded*: `actions` is (N, T) and `observations` (N, T + 1, ...) or (N, T, ...); `lengths` says how many steps count, and
     what is beyond is not read.
 
+    *States alone*: `actions` is None, and `observations` an array an episode, with T_i + 1 of them; or one long array of n + N,
+    with `lengths` (steps), `ends` (true in the last observation of an episode) or `episode` (of each observation).
+
     Args:
         observations: members of the space; for a Tuple or Dict space lists of them, or a tuple or dictionary of arrays.
-        actions: whole numbers.
+        actions: whole numbers; None where only the states are known.
         rewards: laid out like `actions`; 0.0 where they are not known: no learner reads them, and a report pays the
             expert of such a dataset by the table.
         terminated: did the environment end it? One boolean, (N,) booleans, or laid out like `actions`.
@@ -98,6 +104,8 @@ def episodes_of(how: Reading, columns: dict[str, Any], cuts: Mapping[str, Any]) 
     if len(cuts) > 1:
         raise InvalidParameter(f"{' and '.join(cuts)} are both given: expected one of them. Leave the other out.")
     actions = columns["actions"]
+    if actions is None:
+        return _states_alone(how, columns, cuts)
     if not is_list(actions):
         raise InvalidDemonstrations(f"the actions are {type(actions).__name__}: expected an array, or a list of arrays.")
     if len(actions) == 0:
@@ -113,6 +121,24 @@ def episodes_of(how: Reading, columns: dict[str, Any], cuts: Mapping[str, Any]) 
     if not cuts:
         cuts = {key: columns[key] for key in FLAGS if columns.get(key) is not None}
     return cut(how, columns, _offsets(len(actions), cuts), _row_from_0)
+
+
+def _states_alone(how: Reading, columns: dict[str, Any], cuts: Mapping[str, Any]) -> list[Episode]:
+    """Episodes without actions; arguments and errors as `episodes_of`."""
+    if not is_list(first_part(columns["observations"])) or not len(first_part(columns["observations"])):
+        raise InvalidDemonstrations("there are no rows: expected at least two observations of an episode.")
+    if not cuts:
+        return from_lists(how, columns)
+    rows = batch_size(members(how.space, columns["observations"], "observation", _row_from_0))
+    if "lengths" not in cuts:
+        return cut(how, columns, _offsets(rows, cuts), _row_from_0)
+    counts = counts_of(cuts["lengths"])
+    if counts.sum() + counts.size != rows:
+        raise InvalidDemonstrations(
+            f"the lengths add up to {counts.sum()} steps in {counts.size} episodes, of {rows} observations: expected "
+            f"{counts.sum() + counts.size}, one more than steps in each. Give the steps of each episode."
+        )
+    return cut(how, columns, offsets_of(counts))
 
 
 def _row_from_0(row: int) -> str:

@@ -112,11 +112,16 @@ def from_lists(how: Reading, columns: Mapping[str, Any]) -> list[Episode]:
     Raises:
         InvalidDemonstrations: rows that cannot be right.
     """
-    noun, actions = how.noun, columns["actions"]
-    counts = np.array([len(one) if is_list(one) else 0 for one in actions])
-    if (counts == 0).any():
+    noun, states_only = how.noun, columns["actions"] is None
+    if states_only:
+        seen = enumerate(columns["observations"])
+        counts = np.array([batch_size(_part(how, "observations", one, number)) - 1 for number, one in seen])
+    else:
+        counts = np.array([len(one) if is_list(one) else 0 for one in columns["actions"]])
+    if (counts <= 0).any():
         number = int(np.argmin(counts))
-        raise InvalidDemonstrations(f"{noun} {number} (from 0) has no steps: expected at least one action. Leave it out.")
+        expected = "at least two observations" if states_only else "at least one action"
+        raise InvalidDemonstrations(f"{noun} {number} (from 0) has no steps: expected {expected}. Leave it out.")
     flat = dict(columns)
     for key, value in columns.items():
         if value is None or (key in FLAGS and depth(value) < 2):

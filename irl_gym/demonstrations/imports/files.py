@@ -152,6 +152,8 @@ def _check_columns(where: str, there: Sequence[Any], columns: dict[str, str], op
         taken = {other for key, other in columns.items() if key != role}
         close = closest(column, [str(one) for one in there if one not in taken])
         mend = f"Did you mean {role}={close!r}?" if close else f"Name the right one with {role}=..."
+        if role == "action":
+            mend += " If only the states are known, pass action=None."
         known = [str(one)[:80] for one in there]
         raise InvalidDemonstrations(
             f"{where} has no column {column!r}: expected it for {role}, among the columns {known}. {mend}"

@@ -38,7 +38,7 @@ def from_frame(
     episode: str | None = "episode",
     step: str | None = "step",
     observation: Any = "observation",
-    action: str = "action",
+    action: str | None = "action",
     reward: str | None = "reward",
     terminated: str | None = "terminated",
     truncated: str | None = "truncated",
@@ -61,7 +61,7 @@ def from_frame(
         episode: id of the episode; its rows may stand anywhere. None: a row that is terminated or truncated ends an episode.
         step: its rows are sorted by it; it goes up by 1 from any number. None: they are in order.
         observation: what was seen before the action.
-        action: whole numbers.
+        action: whole numbers; None: only the states are known, and the last row of an episode is its last observation.
         reward: 0.0 where there is none, or no column "reward": no learner reads them, and a report pays by the table.
         terminated: true in the last row of an episode that the environment ended. An episode without counts as truncated. Like
             reward and truncated it may be missing where it is not named.
@@ -92,13 +92,13 @@ def from_frame(
     others = {key: table.role(roles[key]) for key in FLAGS} | {"rewards": table.role(reward)}
     seen = table.gathered(how.space, observation, "observation")
     following = None if next_observation is None else table.gathered(how.space, next_observation, "next observation")
-    return LogColumns(how, offsets, table.name, seen, table.columns[action], next_observations=following, **others).episodes()
+    return LogColumns(how, offsets, table.name, seen, table.role(action), next_observations=following, **others).episodes()
 
 
 def _sorted(source: Any, roles: dict[str, str | None], observation: Any, next_observation: Any) -> tuple["_Table", np.ndarray]:
     """The columns that are named, sorted by episode and step, and (N + 1,) where each episode starts."""
     named = {key: value for key, value in roles.items() if value is not None}
-    for key, value in {"action": roles["action"], **named}.items():
+    for key, value in named.items():
         if not isinstance(value, str):
             raise InvalidParameter(f"{key} is {value!r}: expected the name of a column.")
     wanted = named | _roles("observation", observation)

@@ -44,7 +44,8 @@ def from_pairs(
 
     Args:
         pairs: tuples of (observation, action) or (observation, action, reward), or of `fields`.
-        fields: what the tuples hold, in order, out of observation, action, reward, episode, terminated, truncated.
+        fields: what the tuples hold, in order, out of observation, action, reward, episode, terminated, truncated; without
+            action only the states are known, and the last pair of an episode is its last observation.
         last: what to do where an episode ends without its last observation: "keep" the last action, whose successor is then
             not known, "drop" it, "repeat" the last observation, or "row", the last pair's action means nothing; see
             `irl_gym.demonstrations.imports.rows`.
@@ -63,8 +64,8 @@ def from_pairs(
         raise InvalidDemonstrations(f"the pairs are {type(pairs).__name__}: expected something to iterate over.")
     names = list(fields) if isinstance(fields, Sequence) else []
     known = all(is_word(one, *FIELDS) and names.count(one) == 1 for one in names)
-    if fields is not None and not (known and set(FIELDS[:2]) <= set(names)):
-        raise InvalidParameter(f"fields are {fields!r}: expected observation, action and others of {FIELDS}, once each.")
+    if fields is not None and not (known and FIELDS[0] in names):
+        raise InvalidParameter(f"fields are {fields!r}: expected observation, and others of {FIELDS}, once each.")
     return _counted(_episodes(pairs, tuple(names), how))
 
 
@@ -87,7 +88,7 @@ def _episodes(pairs: Iterable[Any], fields: tuple[str, ...], how: Reading) -> It
             steps, closed = [], False
             continue
         step = _step(pair, fields, number)
-        final = step["action"] is None
+        final = "action" in step and step["action"] is None
         follows = bool(steps) and step.get("episode") == steps[-1].get("episode")
         ended = any(truths([step[key]], key, lambda _, n=number: _name(n))[0] for key in FLAGS if step.get(key) is not None)
         if steps and (not follows or (closed and not final and "episode" not in step)):
@@ -130,6 +131,7 @@ def _episode(steps: list[dict[str, Any]], first: int, how: Reading) -> Episode:
         return _name(first + row)
 
     columns: dict[str, Any] = {}
+    how = how if "action" in steps[0] else replace(how, last="row")
     for column, key in {"rewards": "reward", "terminated": "terminated", "truncated": "truncated"}.items():
         values = [step.get(key) for step in steps]
         if all(value is None for value in values):
@@ -142,9 +144,9 @@ def _episode(steps: list[dict[str, Any]], first: int, how: Reading) -> Episode:
                 f"{name(missing[0])} has no {key}: expected one in every pair of an episode, or in none."
             )
         columns[column] = values
-    actions = [step["action"] for step in steps]
+    actions = [step["action"] for step in steps] if "action" in steps[0] else None
     (episode,) = LogColumns(
         how, np.array([0, len(steps)]), name, [step["observation"] for step in steps],
-        np.array(actions, dtype=object) if how.last == "row" else actions, **columns,
+        np.array(actions, dtype=object) if how.last == "row" and actions is not None else actions, **columns,
     ).cut()  # fmt: skip
     return episode

@@ -17,6 +17,8 @@ but the person who imports can tell which; `last` says it:
 
 With "drop" and "repeat" an episode counts as truncated, whatever its flags say: the step that ended it is not in it, or led to
 no end. Where a log has no flags, or an episode stops without one, it counts as truncated too.
+
+Without actions there is no pair to keep: as with "row", an episode's last row is its last observation, whatever `last` says.
 """
 
 import warnings
@@ -50,7 +52,7 @@ class LogColumns:
     observations: Any
     """n observations, in any layout that `members` takes."""
     actions: Any
-    """(n,) in the source's numbering."""
+    """(n,) in the source's numbering; None where only the states are known."""
     rewards: Any = None
     """(n,); None where the log has none: then they are 0.0. No learner reads them; a report on such a dataset cannot say what
     the expert earned."""
@@ -88,22 +90,23 @@ class LogColumns:
             successors = self._observations(self.next_observations, "next observation")
             self._check_linked(batch, successors)
             finals = take(successors, self._lasts)
-        elif self.how.last in ("keep", "repeat"):
+        elif self._last in ("keep", "repeat"):
             finals = take(batch, self._lasts)
         else:
             self._check_longer_than_one(lengths)
-        ending = "seen" if self.next_observations is not None else ENDINGS[self.how.last]
+        ending = "seen" if self.next_observations is not None else ENDINGS[self._last]
         offsets = self.offsets  # of the observations
         if finals is not None:  # put in after the rows of each episode
             batch = by_part(lambda part, final: np.insert(part, self.offsets[1:], final, axis=0), batch, finals)
             offsets = offsets + np.arange(len(offsets))
-        if self.next_observations is None and self.how.last in ("drop", "repeat"):  # then the step that ended it is not known
+        if self.next_observations is None and self._last in ("drop", "repeat"):  # then the step that ended it is not known
             terminated = np.zeros_like(terminated)
         bounds = zip(self.offsets.tolist(), offsets.tolist(), offsets[1:].tolist(), strict=False)
         episodes = []
         for (row, start, stop), ended, limited in zip(bounds, terminated.tolist(), truncated.tolist(), strict=True):
             steps, seen = slice(row, row + stop - start - 1), take(batch, slice(start, stop))
-            episodes.append(Episode(seen, actions[steps], rewards[steps], ended, limited or not ended, ending=ending))
+            taken = None if actions is None else actions[steps]
+            episodes.append(Episode(seen, taken, rewards[steps], ended, limited or not ended, ending=ending))
         return episodes
 
     @property
@@ -116,9 +119,14 @@ class LogColumns:
         return self.offsets[1:] - 1
 
     @property
+    def _last(self) -> Last:
+        """What is done where the last observation is missing."""
+        return "row" if self.actions is None else self.how.last
+
+    @property
     def _only_observed(self) -> bool:
         """Has the last row of an episode an observation and nothing else?"""
-        return self.next_observations is None and self.how.last == "row"
+        return self.next_observations is None and self._last == "row"
 
     def _observations(self, raw: Any, what: str) -> Any:
         batch = members(self.how.space, raw, what, self.name)
@@ -139,7 +147,9 @@ class LogColumns:
             raise InvalidDemonstrations(f"the {what}s have shape {array.shape}: expected ({self._n},), one a row.")
         return array
 
-    def _actions(self) -> np.ndarray:
+    def _actions(self) -> np.ndarray | None:
+        if self.actions is None:
+            return None
         array, how = self._column(self.actions, "action"), self.how
         array = array.astype(np.int64) if array.dtype.kind == "u" else array  # so that the difference may be negative
         counted = array - how.first_action
@@ -195,9 +205,10 @@ class LogColumns:
         if (lengths < 2).any():
             first = int(self.offsets[np.argmax(lengths < 2)])
             mend = "Leave the episode out." if self._only_observed else "Give the next observations, or pass last='keep'."
+            how = f"which has no steps without its last action (last={self.how.last!r})"
+            why = "which is no step" if self.actions is None else how
             raise InvalidDemonstrations(
-                f"{self.name(first)} is the only row of its episode, which has no steps without its last action "
-                f"(last={self.how.last!r}): expected at least two rows. {mend}"
+                f"{self.name(first)} is the only row of its episode, {why}: expected at least two rows. {mend}"
             )
 
     def _check_linked(self, batch: Any, successors: Any) -> None:

@@ -74,7 +74,7 @@ class Transitions:
             raise UndefinedDistance("there are no episodes: expected at least one, with two transitions or more.")
         return cls(
             joined([take(one.observations, slice(None, -1)) for one in kept]),
-            np.concatenate([one.actions for one in kept]),
+            np.concatenate([one.taken(f"episode {i}") for i, one in enumerate(kept)]),
             joined([take(one.observations, slice(1, None)) for one in kept]),
             np.concatenate([(np.arange(len(one)) == len(one) - 1) & one.terminated for one in kept]),
             np.repeat(np.arange(len(kept)), [len(one) for one in kept]),

@@ -46,7 +46,7 @@ class Clone:
     """The most frequent action, the lowest of those that tie, in place of the shares: of an expert that errs now and then."""
     cells: Sequence[int] | np.ndarray | None = None
     """(S,) the cell of each state, whole numbers from 0: states of a cell are not told apart. None: each state is its own."""
-    needs: ClassVar[Needs] = Needs(("demonstrations",), ("dynamics",))
+    needs: ClassVar[Needs] = Needs(("demonstrations",), ("dynamics",), "inferred")
     """The parts of a problem that `learn` reads; the dynamics tell which states matter, and which are near."""
     how: ClassVar[str] = "cloned from the episodes"
     """How its policy comes about."""
@@ -76,7 +76,8 @@ class Clone:
         """
         known = self.needs.of(problem, self)
         discrete_actions(known.spaces.actions)
-        return self.fit(known.seen, known.dynamics if isinstance(known.dynamics, TransitionTable) else None)
+        table = known.dynamics if isinstance(known.dynamics, TransitionTable) else None
+        return replace(self.fit(known.shown.weights, table), inferred=known.inferred)
 
     def fit(
         self, seen: EmpiricalPolicy | np.ndarray, table: TransitionTable | None = None, /, *, states: States | None = None

@@ -8,7 +8,7 @@ says. Where nothing was demonstrated the features decide. Axes: S states, A acti
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -47,7 +47,7 @@ class SoftmaxClone:
     """Price of half the sum of the squared weights, above 0: what keeps the weights of an expert that never errs finite."""
     max_iterations: int = 20_000
     """Of L-BFGS."""
-    needs: ClassVar[Needs] = Needs(("demonstrations",), ("dynamics", "features"))
+    needs: ClassVar[Needs] = Needs(("demonstrations",), ("dynamics", "features"), "inferred")
     """The parts of a problem that `learn` reads; the dynamics tell which states matter."""
     how: ClassVar[str] = "cloned from the episodes, by a softmax of features"
     """How its policy comes about."""
@@ -74,7 +74,8 @@ class SoftmaxClone:
         known, learner = self.needs.of(problem, self), featured(self, problem)
         discrete_actions(known.spaces.actions)
         table = known.dynamics if isinstance(known.dynamics, TransitionTable) else None
-        return learner.fit(known.seen, table, states=known.spaces.states or StateIndex(known.spaces.observations))
+        found = learner.fit(known.shown.weights, table, states=known.spaces.states or StateIndex(known.spaces.observations))
+        return replace(found, inferred=known.inferred)
 
     def fit(
         self, seen: EmpiricalPolicy | np.ndarray, table: TransitionTable | None = None, /, *, states: States | None = None

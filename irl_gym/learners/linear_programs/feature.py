@@ -25,7 +25,7 @@ Axes: S states, A actions, K features.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -85,7 +85,7 @@ class FeatureLP(Record):
     Kept within a fifth, as `FiniteLP.time_limit` is; a caller's features are not cut."""
     trivial_rows: Literal["left out", "as printed"] = "left out"
     """Rows of actions with the expert's successors, 0 under every reward: as printed they hold the state's min at 0."""
-    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), ("features",))
+    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), ("features",), "inferred")
     """The parts of a problem that `learn` reads."""
 
     def __post_init__(self) -> None:
@@ -115,7 +115,7 @@ class FeatureLP(Record):
         """
         known, learner = self.needs.of(problem, self), featured(self, problem)
         world: Any = known.dynamics  # which is required
-        return learner.fit(world, known.policy, states=known.spaces.states)
+        return replace(learner.fit(world, known.policy, states=known.spaces.states), inferred=known.inferred)
 
     def fit(
         self, world: TabularMDP | GenerativeModel, expert: Any, /, *, states: States | None = None

@@ -25,7 +25,7 @@ no unknown state is worth more than it earns.
 Axes: S states, A actions.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -86,7 +86,7 @@ class FiniteLP(Record):
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
     """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
-    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"))
+    needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), actions="inferred")
     """The parts of a problem that `learn` reads."""
     of_feasible_set: ClassVar[bool] = True
     """Is the reward one of those that `irl_gym.judging.ambiguity` describes, by how far they reach and how they depend on
@@ -116,9 +116,12 @@ class FiniteLP(Record):
 
         Raises:
             MissingPart: one of these is not there. And whatever `fit` raises.
+            InvalidDemonstrations: a reward on steps, and actions that states do not tell apart.
         """
         known = self.needs.of(problem, self)
-        return self.fit(checked_mdp(known.dynamics), known.policy, visits=known.visits)
+        if self.reward_on == "state-action" and known.inferred is not None:
+            known.inferred.check_apart()
+        return replace(self.fit(checked_mdp(known.dynamics), known.policy, visits=known.visits), inferred=known.inferred)
 
     def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> Outcome[TabularReward, FiniteProof]:
         """Learn a reward under which the expert is optimal.
@@ -129,7 +132,7 @@ class FiniteLP(Record):
                 of the expert in a state, as in the tables of `irl_gym.demonstrations.demonstrated`: such a state has no row of
                 (4).
             visits: (S,) how often the expert was seen in each state: what its margin and its violation count for. Where the
-                expert is known everywhere and slack is None they change nothing.
+                expert is known everywhere and slack is None they change nothing. No state with visits is avoided.
 
         Raises:
             InvalidPolicy: an expert of the wrong shape or content.

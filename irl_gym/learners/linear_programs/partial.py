@@ -110,7 +110,7 @@ class PartialTask:
         avoided = np.zeros(part.n_states, dtype=bool)
         if learner.unvisited == "avoid" and (~known & ~part.terminal).any():
             entered = np.asarray(part.P_pi(c.distribution)[known].sum(axis=0)).ravel() + part.d0 > 0
-            avoided = ~known & ~(part.terminal & entered)
+            avoided = ~known & ~(part.terminal & entered) & (visits is None or visits[self.rows] == 0)
         if not on_states:
             avoided &= ~part.terminal  # a step ends there, and pays for itself
         weights = np.ones(part.n_states) if visits is None else visits[self.rows]

@@ -76,7 +76,7 @@ class TrajectoryLP(Record):
     time_limit: float | None = None
     """Seconds for the whole fit: its programs, all attempts at them, planning by value iteration and trajectories; None for
     no limit. An agent's training is not cut: the time is up when the next program would begin."""
-    needs: ClassVar[Needs] = Needs(("environment", "demonstrations"), ("features",))
+    needs: ClassVar[Needs] = Needs(("environment", "demonstrations"), ("features",), "not read")
     """The parts of a problem that `learn` reads."""
     how: ClassVar[str] = "planned for the learned reward, in the best of the learner's own rounds"
     """How its policy comes about."""

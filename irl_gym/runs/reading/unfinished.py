@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from irl_gym.demonstrations.datasets import read_minari
-from irl_gym.demonstrations.demonstrated import most_frequent
+from irl_gym.demonstrations.shown import shown
 from irl_gym.errors import IrlGymError
 from irl_gym.features.linear_reward import load_reward
 from irl_gym.files.own_files import check_links
 from irl_gym.files.run_folder import START, changed, checked_record, read_json, read_record
 from irl_gym.files.run_schema import Config, EnvironmentFile
 from irl_gym.judging.diagnoses.case import Case
-from irl_gym.mdp.episodes import empirical_policy
 from irl_gym.mdp.policies import load_actions
 from irl_gym.programs.status import Status
 from irl_gym.runs.certificates import claims_in, read_certificate
@@ -63,4 +62,4 @@ def seen_with_noise(path: Path, table: Tabulation) -> np.ndarray:
     """
     record = checked_record(path, "demonstrations")
     episodes = list(read_minari(record["dataset_id"], root=path / "dataset"))
-    return most_frequent(empirical_policy(episodes, table.states, table.mdp.n_actions))
+    return shown(episodes, table.states, table.mdp.n_actions, table.mdp).policy

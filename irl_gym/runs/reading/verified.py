@@ -152,7 +152,7 @@ def recomputed(
             f"under the reward the best policy earns {now.loss_low:.3g} to {now.loss_bound:.3g} more than the expert: "
             f"expected {below:.3g} to {above:.3g}, as recorded"
         )
-    return optimality_told(now, table)
+    return optimality_told(now, table, inferred=recorded.get("inferred", False))
 
 
 def again(

@@ -135,7 +135,10 @@ class _Found:
 
     def _checked(self, block: list[Episode], lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Cast before they are joined: NumPy joins signed and unsigned integers to floats.
-        actions = np.concatenate([episode.actions.astype(np.int64) for episode in block])
+        actions = np.concatenate([
+            one.taken(f"a table is counted from actions, and episode {self.n_episodes + i}").astype(np.int64)
+            for i, one in enumerate(block)
+        ])  # fmt: skip
         rewards = np.concatenate([np.asarray(episode.rewards, dtype=np.float64) for episode in block])
         wrong = (actions < 0) | (actions >= self.n_actions)
         unpaid = ~(np.abs(rewards) <= LARGEST)  # NaN too

@@ -72,6 +72,8 @@ CASES = [
     ("Sort them.",
      lambda _: from_arrays([0, 0, 4], [1, 1, 2], episode=[0, 1, 0], **LAKE),
      lambda _: from_arrays([0, 4, 0], [1, 2, 1], episode=[0, 0, 1], **LAKE)),
+    ("Give the steps of each episode.",
+     lambda _: from_arrays([0, 4, 0], None, lengths=[3], **LAKE), lambda _: from_arrays([0, 4, 0], None, lengths=[2], **LAKE)),
     # cutting
     ("Leave it out.", lambda _: from_arrays([[0, 4], [0]], [[1], []], **LAKE), lambda _: from_arrays([[0, 4]], [[1]], **LAKE)),
     ("Leave empty episodes out.",
@@ -104,6 +106,8 @@ CASES = [
      lambda _: read(LOG.rename(columns={"action": "Action"}), action="Action")),
     ("Name the right one with action=",
      lambda _: read(LOG.rename(columns={"action": "u"})), lambda _: read(LOG.rename(columns={"action": "u"}), action="u")),
+    ("If only the states are known, pass action=None.",
+     lambda _: read(LOG[:2].drop(columns="action")), lambda _: read(LOG[:2].drop(columns="action"), action=None)),
     # frames
     ("Pass step=None if the rows are in order",
      lambda _: read(frame(step=[0, 7, 0])), lambda _: read(frame(step=[0, 7, 0]), step=None)),

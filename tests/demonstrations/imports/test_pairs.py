@@ -119,7 +119,7 @@ def test_an_array_as_episode_is_refused():
         list(from_pairs(rows, fields=("episode", "observation", "action"), **LAKE))
 
 
-@pytest.mark.parametrize("fields", [("observation",), ("observation", "action", "colour"), ("observation", "action", "action")])
+@pytest.mark.parametrize("fields", [("action",), ("observation", "action", "colour"), ("observation", "action", "action")])
 def test_unknown_fields_are_refused_at_once(fields):
     with pytest.raises(InvalidParameter, match="fields are"):
         from_pairs([(0, 1)], fields=fields, **LAKE)

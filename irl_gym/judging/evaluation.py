@@ -138,8 +138,8 @@ def scale_of(
         episodes: N that the expert is known by; None where it is at hand.
     """
     random, expert = candidates[RANDOM].value, candidates[EXPERT].value
-    # what a factorisation of I - gamma P leaves of values, its condition number being about 1 / (1 - gamma)
-    rounding = 0.0 if table is None else 64 * EPSILON / (1 - gamma) * max(abs(random), abs(expert))
+    # what a factorisation of I - gamma P leaves of values, its condition number being about the effective horizon
+    rounding = 0.0 if table is None else 64 * EPSILON * table.mdp.effective_horizon * max(abs(random), abs(expert))
     return Scale(random, expert, rounding, half, episodes, gamma)
 
 

@@ -70,7 +70,7 @@ class Program:
             self.margins = comparisons.rows @ V  # (4)
         else:
             self.R = cp.Variable(mdp.n_states * mdp.n_actions)
-            unit = 1 / (1 - mdp.gamma)  # weighs (5), so that its residual is not multiplied by this in V
+            unit = mdp.effective_horizon  # weighs (5), so that its residual is not multiplied by this in V
             here_R = sp.csr_array(unit * mdp.mixing(comparisons.distribution))
             self.constraints += [sp.csr_array(unit * closing) @ V == here_R @ self.R]  # (5) on steps
             stacked = comparisons.states * mdp.n_actions + comparisons.actions

@@ -135,6 +135,7 @@ class Row(TypedDict):
     return_high: Number | None
     agreement: Number | None
     how: Text
+    expected_return: NotRequired[Number | None]
     return_share: NotRequired[Number | None]
     sampled_value: NotRequired[Number]
     sampled_low: NotRequired[Number | None]
@@ -180,6 +181,7 @@ class Sized(TypedDict):
     checked: Text | None
     check: CheckEntry | None
     horizon: NotRequired[Count | None]
+    limit: NotRequired[Count]
     split: NotRequired[Count]
     counted: NotRequired[bool]
     error: NotRequired[Number | None]

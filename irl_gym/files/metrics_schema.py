@@ -60,6 +60,8 @@ class RewardEntries(TypedDict, total=False):
     distance_error: Number | None
     truncation: Number
     horizon: Count
+    optimal_within: bool | None
+    loss_within: Number | None
     n_features: Count
     rank: Count
     trivial: Count

@@ -12,6 +12,7 @@ horizon, and R_0 never.
 Axes: S states, A actions, H steps.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -101,11 +102,6 @@ def expanded_policy(policy: Any, table: TransitionTable, horizon: int) -> np.nda
     return np.concatenate([each, each[-1:]]).reshape(-1, table.n_actions)
 
 
-def same_at_all_times(n_states: int, horizon: int) -> Sparse:
-    """((H+1)*S, S) what a number of a state is at each of its times: R(s) as R_h(s)."""
-    return sp.csr_array(sp.kron(np.ones((horizon + 1, 1)), sp.eye_array(n_states), format="csr"))
-
-
 def reward_over_time(reward: TabularReward | np.ndarray, table: TransitionTable, horizon: int) -> np.ndarray | None:
     """(H+1, S) R_h(s), of a reward that depends on the time; None of one that is the same at all times.
 
@@ -141,3 +137,57 @@ def expanded_reward(reward: TabularReward | np.ndarray, table: TransitionTable, 
     one = as_reward(reward)
     tiled = np.tile(one.values, (horizon + 1, *([1] * (one.values.ndim - 1))))
     return TabularReward(tiled, one.note, one.tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """A reward that is the same in several rows of a table, as in a state at all its times."""
+
+    at: Sparse
+    """(R, k) which of the k numbers each of the R = S or S*A entries of the table's reward is; an empty row is 0."""
+    shape: tuple[int, ...]
+    """Of the reward itself: the K numbers that there are, of which the table's states can be paid k."""
+    used: np.ndarray
+    """(k,) which of them."""
+    entries: tuple[int, ...]
+    """(S,) or (S, A), the table's."""
+
+    def among(self, rows: np.ndarray) -> "Repeated":
+        """That of some of the states (S',), with the numbers that these can be paid."""
+        A = self.entries[1] if len(self.entries) > 1 else 1
+        at = self.at[(rows[:, None] * A + np.arange(A)).ravel()]
+        kept = np.flatnonzero(np.asarray(at.sum(axis=0)).ravel())
+        return Repeated(sp.csr_array(at[:, kept]), self.shape, self.used[kept], (rows.size, *self.entries[1:]))
+
+    def spread(self, numbers: np.ndarray) -> np.ndarray:
+        """The table's reward, of the k numbers."""
+        return (self.at @ numbers).reshape(self.entries)
+
+    def numbers(self, values: np.ndarray) -> np.ndarray:
+        """(k,) the numbers, of the table's reward."""
+        first = np.asarray(self.at.argmax(axis=0)).ravel()
+        return values.ravel()[first]
+
+    def whole(self, numbers: np.ndarray) -> np.ndarray:
+        """The reward itself; what nobody is paid is 0."""
+        values = np.zeros(int(np.prod(self.shape)))
+        values[self.used] = numbers
+        return values.reshape(self.shape)
+
+
+def one_for_all_times(mdp: TabularMDP, n_states: int, *, on_states: bool) -> Repeated:
+    """R(s) or R(s, a) on the rows of `time_expanded`; what would be paid for the first state, where nothing arrives, is 0.
+
+    Args:
+        mdp: the expanded table.
+        n_states: S.
+        on_states: is it one on states?
+    """
+    S, A = n_states, mdp.n_actions
+    n, H = (S if on_states else S * A), mdp.n_states // S - 1
+    paid = np.arange(H + 1) > 0 if on_states else np.arange(H + 1) < H
+    at = sp.kron(paid.astype(float)[:, None], sp.eye_array(n), format="csr")
+    if not on_states:
+        at = sp.diags_array((~np.repeat(mdp.terminal, A)).astype(float)) @ at
+    shape = (S,) if on_states else (S, A)
+    return Repeated(sp.csr_array(at), shape, np.arange(n), (mdp.n_states, *shape[1:]))

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from irl_gym.mdp.optimality_rows import Comparisons
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.time_expanded import Repeated
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class DualBound:
     r_max: float
     l1: float
     cap: float | None
+    tie: Repeated | None = None
+    """Of a reward that is the same in several rows: c is then its gradient."""
 
     def bound(self, y: np.ndarray | None) -> float:
         """The least D(y)."""
@@ -62,6 +65,10 @@ class DualBound:
 
     def gradient(self, y: np.ndarray) -> np.ndarray:
         """c, the gradient of sum y margins with respect to R: (S,) or (S*A,), by one transposed solve."""
+        each = self._of_entries(y)
+        return each if self.tie is None else self.tie.at.T @ each
+
+    def _of_entries(self, y: np.ndarray) -> np.ndarray:
         mdp, comparisons = self.mdp, self.comparisons
         if self.on_states:
             return self.discounted.solve_transposed(comparisons.rows.T @ y)

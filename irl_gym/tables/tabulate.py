@@ -2,9 +2,9 @@
 
 `tabulate(env, gamma=...)` asks each source in `SOURCES` in turn: an environment that is a table (TabularEnv), the table that an
 environment publishes, rules that are known (Blackjack), a model that the environment offers (gym-classics). Where none answers,
-copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out: truncation is not
-part of an MDP. Then `env.step` is sampled and compared with the table: an exact one step by step, one that is an estimate by
-fresh episodes, as a second sample.
+copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out, unless a wrapper
+around it reads it: truncation is not part of an MDP. Then `env.step` is sampled and compared with the table: an exact one step
+by step, one that is an estimate by fresh episodes, as a second sample.
 """
 
 import difflib

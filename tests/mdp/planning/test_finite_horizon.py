@@ -15,8 +15,8 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable
 from irl_gym.mdp.time_expanded import expanded_policy, expanded_reward, time_expanded
 
-HORIZONS = (3, 7, 20)
-KINDS = ("sparse", "terminal", "deterministic")
+HORIZONS = range(3, 21)
+KINDS = ("dense", "sparse", "terminal", "deterministic")
 
 
 def drawn(seed, kind, H):

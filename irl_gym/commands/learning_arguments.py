@@ -36,6 +36,8 @@ class Learning:
     """finite-lp. Price of a violation, where a margin is worth 1; none: not at any price. auto: 1 for an expert of episodes."""
     reward_on: Literal["state", "state-action"] = "state"
     """finite-lp. What the recovered reward is a function of."""
+    horizon: Annotated[int | None, UNSET] = None
+    """finite-lp. Steps of an episode: the expert is the best in undiscounted sums of so many; the default is none."""
     features: FeatureName = "auto"
     """feature-lp and trajectory-lp. auto is one-hot for discrete observations, radial for others."""
     size: Annotated[int | None, UNSET] = None
@@ -92,7 +94,7 @@ class Learning:
             slack = None if self.slack == "none" else self.slack
         return FiniteLP(
             l1=self.l1, margin_cap=self.cap, reward_on=self.reward_on, report_lambda_0=True, slack=slack,
-            time_limit=self.time_limit,
+            time_limit=self.time_limit, horizon=self.horizon,
         )  # fmt: skip
 
     def linear(self, env: "gym.Env", control: bool, seed: int) -> "FeatureLP | TrajectoryLP":

@@ -61,6 +61,8 @@ class RewardEntries(TypedDict, total=False):
     distance_error: Number | None
     truncation: Number
     horizon: Count
+    optimal_within: bool | None
+    loss_within: Number | None
     n_features: Count
     rank: Count
     trivial: Count
@@ -136,6 +138,7 @@ class Row(TypedDict):
     return_high: Number | None
     agreement: Number | None
     how: Text
+    expected_return: NotRequired[Number | None]
     return_share: NotRequired[Number | None]
     sampled_value: NotRequired[Number]
     sampled_low: NotRequired[Number | None]
@@ -181,6 +184,7 @@ class Sized(TypedDict):
     checked: Text | None
     check: CheckEntry | None
     horizon: NotRequired[Count | None]
+    limit: NotRequired[Count]
     split: NotRequired[Count]
     counted: NotRequired[bool]
     error: NotRequired[Number | None]

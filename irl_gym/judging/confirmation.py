@@ -87,7 +87,7 @@ def _discounted(table: Tabulation, episodes: Sequence[Episode]) -> tuple[np.ndar
     gamma = table.mdp.gamma
     returns = np.array([gamma ** np.arange(len(one)) @ one.rewards for one in episodes])
     left = np.array([0.0 if one.terminated else gamma ** len(one) for one in episodes])
-    return returns, float(left.mean()) * table.payments.largest / (1 - gamma)
+    return returns, float(left.mean()) * table.payments.largest * table.mdp.effective_horizon
 
 
 def loss_told(row: Mapping[str, Any]) -> str:

@@ -41,6 +41,11 @@ class JudgingWorld(Protocol):
         """Discount."""
         ...
 
+    @property
+    def limit(self) -> int:
+        """Steps after which episodes are cut."""
+        ...
+
     def value(self, policy: Any) -> float:
         """Discounted, from the start, under the true reward."""
         ...
@@ -127,7 +132,7 @@ def evaluate(
     good = None
     if table is not None:
         good = good_actions(table.mdp, None if episodes_only else policies[EXPERT][0], optimum(table.mdp, table.reward))
-    return judge(candidates, scale, table, horizon, good), scale
+    return judge(candidates, scale, table, horizon, good, world.limit), scale
 
 
 def scale_of(
@@ -143,14 +148,14 @@ def scale_of(
         episodes: N that the expert is known by; None where it is at hand.
     """
     random, expert = candidates[RANDOM].value, candidates[EXPERT].value
-    # what a factorisation of I - gamma P leaves of values, its condition number being about 1 / (1 - gamma)
-    rounding = 0.0 if table is None else 64 * EPSILON / (1 - gamma) * max(abs(random), abs(expert))
+    # what a factorisation of I - gamma P leaves of values, its condition number being about the effective horizon
+    rounding = 0.0 if table is None else 64 * EPSILON * table.mdp.effective_horizon * max(abs(random), abs(expert))
     return Scale(random, expert, rounding, half, episodes, gamma)
 
 
 def judge(
     candidates: Mapping[str, Candidate], scale: Scale, table: Tabulation | None, horizon: int | None, good: ActionSets | None,
-    *, sampled: bool = True,
+    limit: int | None, *, sampled: bool = True,
 ) -> dict[str, dict[str, Any]]:  # fmt: skip
     """The rows of metrics.json: every measure of each policy.
 
@@ -160,9 +165,11 @@ def judge(
         table: None without one.
         horizon: steps that values count; None for all.
         good: (S, A) actions that agree with the expert; None without a table.
+        limit: steps after which episodes are cut; None where that was not recorded.
         sampled: measures that rest on episodes, too.
     """
-    by = Yardstick(scale, candidates[EXPERT].returns, candidates[RANDOM].returns, table, horizon, good)
+    limit = limit if table is not None and table.evidence.exact else None
+    by = Yardstick(scale, candidates[EXPERT].returns, candidates[RANDOM].returns, table, horizon, good, limit)
     return {
         name: {"how": one.how}
         | measured(

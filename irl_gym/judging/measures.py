@@ -24,6 +24,7 @@ from irl_gym.errors import UndefinedDistance
 from irl_gym.intervals import Interval, as_interval
 from irl_gym.judging.confirmation import loss_by_episodes, value_by_episodes
 from irl_gym.judging.distances import epic, starc
+from irl_gym.judging.expected_returns import expected_return, expected_told
 from irl_gym.judging.metrics import Tie, agreement, policy_value, worst_tie
 from irl_gym.judging.scores import Scale, score_of
 from irl_gym.judging.shares import MUCH, share_of_return
@@ -52,6 +53,8 @@ class Yardstick:
     """Steps that values count; None for all."""
     good: ActionSets | None
     """(S, A) actions that agree with the expert; None without a table."""
+    limit: int | None = None
+    """Steps after which episodes are cut; None where the table is not exact, or that was not recorded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,17 +214,9 @@ def _agrees(one: JudgedPolicy) -> float | None:
     return agreement(one.by.table.mdp, one.policy, one.by.good)
 
 
-def _by_episodes(one: JudgedPolicy) -> tuple[Any, ...]:
+def _by_episodes(found: Interval) -> tuple[float | None, ...]:
     """The value that fresh episodes say it has."""
-    assert one.by.table is not None
-    found = value_by_episodes(one.by.table, one.episodes, one.by.horizon)
     return found.estimate, *found.ends
-
-
-def _loses(one: JudgedPolicy) -> float | None:
-    """What it loses at most against the best."""
-    assert one.by.table is not None
-    return loss_by_episodes(one.by.table, one.episodes).ends[1]
 
 
 POLICIES: tuple[Measure, ...] = (
@@ -232,18 +227,23 @@ POLICIES: tuple[Measure, ...] = (
         lambda one: (None, None, None) if one.returns is None else (one.returns.estimate, *one.returns.ends), sampled=True,
     ),
     Measure(
+        ("expected_return",), "expected return", expected_told, number,
+        lambda one: (expected_return(one.by.table, one.policy, one.by.limit),), asked=lambda one: one.by.limit is not None,
+    ),
+    Measure(
         ("return_share",), "returned", "the mean return as a share, random = 0, expert = 1", score_of,
         lambda one: (share_of_return(one.returns, one.by.expert, one.by.random),), sampled=True, relative=True,
     ),
     Measure(
         ("sampled_value", "sampled_low", "sampled_high"), "value by episodes (95 %)",
-        "the same as value, by episodes that were not counted", _interval, _by_episodes,
+        "the same as value, by episodes that were not counted", _interval,
+        lambda one: _by_episodes(value_by_episodes(one.by.table, one.episodes, one.by.horizon)),
         asked=lambda one: one.counted, sampled=True,
     ),
     Measure(
         ("loses_at_most",), "loses at most",
         "of value against the policy that is best by the table, by episodes that were not counted, with 95 % confidence",
-        number, lambda one: (_loses(one),),
+        number, lambda one: (loss_by_episodes(one.by.table, one.episodes).ends[1],),
         asked=lambda one: one.counted and one.by.horizon is None and not one.reference, sampled=True,
         even_unknown=True,
     ),

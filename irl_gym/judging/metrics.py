@@ -13,6 +13,7 @@ from irl_gym._typing import ActionSets, Matrix, Vector
 from irl_gym.checks import checked_number, is_word
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp.planning.dynamic_programming import occupancy, optimum, policy_evaluation, policy_iteration
+from irl_gym.mdp.planning.finite_horizon import value_within
 from irl_gym.mdp.planning.howard import OUTWARDS, Optimum
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, as_reward
@@ -88,18 +89,11 @@ def policy_value(mdp: TabularMDP, reward: TabularReward | np.ndarray, policy: An
 
     Raises:
         InvalidMDP, InvalidReward, InvalidPolicy: no table, or a reward or policy of another.
-        InvalidParameter: a horizon that is not a whole number of at least 0.
+        InvalidParameter: a horizon that is not a whole number of at least 1.
     """
     if horizon is None:
         return float(checked_mdp(mdp).d0 @ policy_evaluation(mdp, as_reward(reward), policy))
-    steps = int(checked_number("horizon", horizon, "a whole number of steps of at least 0, or None", least=0, whole=True))
-    mixing = checked_mdp(mdp).mixing(policy)
-    P_pi, R_pi = mixing @ mdp.P, mixing @ as_reward(reward).expected(mdp).ravel()
-    at, value = mdp.d0, 0.0
-    for time in range(steps):
-        value += mdp.gamma**time * float(at @ R_pi)
-        at = at @ P_pi
-    return value
+    return value_within(checked_mdp(mdp), as_reward(reward), policy, horizon=horizon, gamma=mdp.gamma)
 
 
 def random_value(mdp: TabularMDP, reward: TabularReward | np.ndarray) -> float:

@@ -235,7 +235,7 @@ def metrics(
         policies, world, table, horizon, given=None if given is None else demonstrations, episodes_only=from_episodes,
         episodes=eval_episodes, seed=seed,
     )  # fmt: skip
-    content = scorecard(config, records, certificate, rows, scale, curve, table, horizon, tabular)
+    content = scorecard(config, records, certificate, rows, scale, curve, table, horizon, tabular, world.limit)
     write_json(folder / "metrics.json", content)
     return {}
 

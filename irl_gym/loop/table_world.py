@@ -75,6 +75,11 @@ class TableWorld:
         return self.table.mdp.gamma
 
     @property
+    def limit(self) -> int:
+        """Steps after which episodes are cut."""
+        return step_limit(self.env)
+
+    @property
     def mdp(self) -> TabularMDP:
         """P, gamma and d0."""
         return self.table.mdp
@@ -112,7 +117,7 @@ class TableWorld:
         """A policy for a reward, the true one if None, from steps of the table."""
         paid = self.table.reward if reward is None else self.tabular(reward)
         env = TabularVecEnv(
-            self.table.mdp, paid, num_envs=self.num_envs, max_episode_steps=step_limit(self.env),
+            self.table.mdp, paid, num_envs=self.num_envs, max_episode_steps=self.limit,
             states=self.table.states, show_rows=shows_rows(self.table.states), seed=self.seed,
         )  # fmt: skip
         return planner.plan(env, gamma=self.gamma, seed=self.seed, progress=progress)
@@ -210,7 +215,7 @@ class TableWorld:
 
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes: from the table where it is exact and holds every reward, else by stepping the environment."""
-        table, limit = self.table, step_limit(self.env)
+        table, limit = self.table, self.limit
         if table.evidence.exact and table.payments.entries is not None:
             drawn = collect_from_table(
                 table.mdp, table.payments.entries, table.states, policy, n, seed=seed, max_episode_steps=limit
@@ -232,5 +237,5 @@ class TableWorld:
 
     def returns(self, glanced: Sequence[np.ndarray]) -> tuple[Sequence[np.ndarray], tuple[float, float] | None]:
         """Returns of sampled episodes of policies (S,), and the only two that are possible; drawn together, which is fast."""
-        limit, seed = step_limit(self.env), self.seed + 7_919
+        limit, seed = self.limit, self.seed + 7_919
         return sampled_returns(self.table, glanced, EPISODES, limit=limit, seed=seed), two_returns(self.table)

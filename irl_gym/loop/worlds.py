@@ -75,6 +75,11 @@ class SteppedWorld:
             raise InvalidParameter(f"{self.env} has no spec: expected an environment that gymnasium.make made. Register it.")
 
     @property
+    def limit(self) -> int:
+        """Steps after which episodes are cut."""
+        return step_limit(self.env)
+
+    @property
     def random(self) -> RandomPolicy:
         """Uniformly random actions."""
         space: Any = self.env.action_space
@@ -181,7 +186,7 @@ class SteppedWorld:
     def episodes(self, policy: Any, n: int, seed: int) -> list[Episode]:
         """Episodes of a policy, deterministic but for the random one and for noise, which is drawn anew from the seed."""
         acting = self.random if isinstance(policy, RandomPolicy) else _anew(policy, seed)
-        return run_episodes(self.env, acting, n, seed=seed, most=step_limit(self.env))
+        return run_episodes(self.env, acting, n, seed=seed, most=self.limit)
 
     def value(self, policy: Any) -> float:
         """Mean discounted return of `eval_episodes` episodes."""

@@ -18,7 +18,8 @@ from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 
 TIE = 1e-8
-"""Share of the terms of a difference, times 1 - gamma, up to which it is none: a hundredth of what decides over all steps."""
+"""Share of the terms of a difference, by the effective horizon, up to which it is none: a hundredth of what decides over all
+steps."""
 
 
 def comparable(comparisons: Comparisons, reward: TabularReward) -> np.ndarray:
@@ -179,6 +180,6 @@ def _margins(
     noise = 0.0 if comparisons.sampling is None else comparisons.sampling.of_margins(worth)
     margins, rounding = values[at] * moved, np.where(moved, unsure[at], 0.0)
     level = found.level_against(comparisons.distribution, onwards)[at]
-    nothing = TIE * (1 - found.table.mdp.gamma) * found.advantages.size[at]
+    nothing = TIE / found.table.mdp.effective_horizon * found.advantages.size[at]
     same, tied = ((np.abs(margins) <= np.minimum(level, nothing) + more) & (rounding <= nothing) for more in (0.0, left))
     return Margins(margins, rounding + noise, level + left, rounding, same, tied, worth)

@@ -103,7 +103,8 @@ def as_compared(mdp: TabularMDP, comparisons: Comparisons, on_states: bool) -> T
     kept[pairs] = 0.0
     own = sp.csr_array(mdp.mixing(comparisons.distribution)[comparisons.states[same]])
     place = sp.csr_array((np.ones(pairs.size), (pairs, np.arange(pairs.size))), shape=(mdp.P.shape[0], pairs.size))
-    return TabularMDP(sp.csr_array((sp.diags_array(kept) + place @ own) @ mdp.P), mdp.gamma, mdp.d0, mdp.visits)
+    P = sp.csr_array((sp.diags_array(kept) + place @ own) @ mdp.P)
+    return TabularMDP(P, mdp.gamma, mdp.d0, mdp.visits, mdp.horizon)
 
 
 def left_out(mdp: TabularMDP, rows: Indices, c: Comparisons, unbreakable: Any) -> np.ndarray:

@@ -7,7 +7,8 @@ table with a discount, which no environment carries and which is never guessed.
     d0       (S,) distribution of the first state
     visits   (S, A) steps that each row of P was estimated from; None where P is exact
 A state is *terminal* when its A rows are zero: the episode ends on arrival, so nothing comes after. This is the only place
-that says so. Axes: S states, A actions.
+that says so. Where every episode ends within H steps, whatever is done, a table has a `horizon`, and gamma may be 1; any table
+is made one by `irl_gym.mdp.time_expanded`. Axes: S states, A actions.
 """
 
 from functools import cached_property
@@ -20,6 +21,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from irl_gym._typing import Indices, Sparse, StateMask, Vector
 from irl_gym.checks import SUM_TOLERANCE, any_array, checked_number, float_array, of_single_precision, shown_sum, sparse_copy
 from irl_gym.errors import InvalidDiscount, InvalidMDP, a_type
+from irl_gym.mdp.longest_episode import longest_episode
 from irl_gym.mdp.policies import as_distribution, policy_array
 
 AS_GOOD_AS_EXACT = 10**9
@@ -127,18 +129,25 @@ class TabularMDP(TransitionTable):
 
     Args:
         P: (S*A, S), sparse or dense; row s * A + a sums to 1, or to 0 in a terminal state.
-        gamma: discount, strictly between 0 and 1.
+        gamma: discount, strictly between 0 and 1; or 1, where there is a horizon.
         d0: (S,), the distribution of the first state.
         visits: (S, A) steps that each row of P is the mean of; None where P is exact.
+        horizon: H, steps within which every episode ends in P itself, which is checked; None for no such bound. An episode that
+            is cut from outside after H steps is one of another table: `irl_gym.mdp.time_expanded.time_expanded(table, H)`.
 
     Raises:
-        InvalidMDP: naming the first offending state and action.
-        InvalidDiscount: gamma outside (0, 1).
+        InvalidMDP: naming the first offending state and action; or an episode can be longer than the horizon.
+        InvalidDiscount: gamma outside (0, 1), or 1 without a horizon.
+        InvalidParameter: a horizon that is no whole number of at least 1.
     """
 
-    def __init__(self, P: Any, gamma: float, d0: Any, visits: Any = None):
-        self.gamma: float = check_discount(gamma)
+    def __init__(self, P: Any, gamma: float, d0: Any, visits: Any = None, horizon: int | None = None):
+        self.horizon: int | None = None if horizon is None else checked_horizon(horizon)
+        self.gamma: float = check_discount(gamma, horizon)
         super().__init__(P, d0, visits)
+        if self.horizon is not None:
+            self._check_ends(self.horizon)
+            return
         most = float(self.P.sum(axis=1).max(initial=0.0))
         if self.gamma * most >= 1:
             raise InvalidMDP(
@@ -146,7 +155,23 @@ class TabularMDP(TransitionTable):
             )
 
     def __reduce__(self) -> tuple:
-        return type(self), (self.P, self.gamma, self.d0, self.visits)
+        return type(self), (self.P, self.gamma, self.d0, self.visits, self.horizon)
+
+    def _check_ends(self, horizon: int) -> None:
+        longest = longest_episode(self.P, self.n_actions)
+        if longest is None or longest > horizon:
+            found = "one can go on for ever" if longest is None else f"the longest has {longest} steps"
+            raise InvalidMDP(
+                f"horizon is {horizon}, and of the episodes of P {found}: expected P in which all end by then. Put the time in "
+                "the states, with `irl_gym.mdp.time_expanded.time_expanded(TransitionTable(P, d0), horizon)`."
+            )
+
+    @property
+    def effective_horizon(self) -> float:
+        """Discounted states of an episode at most, the first among them: 1/(1 - gamma), or 1 + gamma + ... + gamma^H."""
+        if self.horizon is None:
+            return 1 / (1 - self.gamma)
+        return -np.expm1((self.horizon + 1) * np.log(self.gamma)) / (1 - self.gamma) if self.gamma < 1 else self.horizon + 1.0
 
     def restrict(self, rows: Indices) -> "TabularMDP":
         """The MDP of some states only, renumbered in the order given.
@@ -159,7 +184,7 @@ class TabularMDP(TransitionTable):
         start = self.d0[rows]
         if abs(P.sum() - self.P[stacked].sum()) > 1e-6 or abs(start.sum() - 1) > 1e-6:
             raise InvalidMDP(f"the {rows.size} states are not closed: an action or a start leads out of them.")
-        return TabularMDP(P, self.gamma, start, None if self.visits is None else self.visits[rows])
+        return TabularMDP(P, self.gamma, start, None if self.visits is None else self.visits[rows], self.horizon)
 
 
 def checked_mdp(mdp: Any) -> TabularMDP:
@@ -174,14 +199,24 @@ def checked_mdp(mdp: Any) -> TabularMDP:
     raise InvalidMDP(f"mdp is {a_type(mdp)}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`. {mend}".strip())
 
 
-def check_discount(gamma: float) -> float:
-    """Return gamma, a float strictly between 0 and 1.
+def check_discount(gamma: float, horizon: int | None = None) -> float:
+    """Return gamma, a float strictly between 0 and 1; or 1, where there is a horizon.
 
     Raises:
         InvalidDiscount: anything else.
     """
-    expected = "a discount strictly between 0 and 1, such as 0.99"
-    return checked_number("gamma", gamma, expected, above=0, below=1, error=InvalidDiscount)
+    below = 1 if horizon is None else np.nextafter(1, 2)
+    within = "strictly between 0 and 1, such as 0.99; or 1 with a horizon" if horizon is None else "above 0, and at most 1"
+    return checked_number("gamma", gamma, f"a discount {within}", above=0, below=below, error=InvalidDiscount)
+
+
+def checked_horizon(horizon: Any) -> int:
+    """Return H, a whole number of at least 1.
+
+    Raises:
+        InvalidParameter: anything else.
+    """
+    return int(checked_number("horizon", horizon, "a whole number of steps of at least 1", least=1, whole=True))
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

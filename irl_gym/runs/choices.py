@@ -10,7 +10,7 @@ FeatureName = Literal["auto", "one-hot", "radial", "fourier", "polynomial"]
 Reveals = Mapping[str, int | Sequence[Any]] | Literal["known"]
 KNOWN: Literal["known"] = "known"
 TAKEN: Mapping[str, tuple[str, ...]] = {
-    "finite-lp": ("l1", "margin_cap", "slack", "reward_on", "time_limit"),
+    "finite-lp": ("l1", "margin_cap", "slack", "reward_on", "horizon", "time_limit"),
     "feature-lp": ("l1", "margin_cap", "features", "size", "coordinates", "sample", "time_limit"),
     "trajectory-lp": ("l1", "features", "size", "coordinates", "rounds", "gap_cap", "inner", "time_limit"),
 }

@@ -41,7 +41,7 @@ STATE_LISTS = ("inseparable", "marginless", "unbreakable", "unconstrained", "und
 def scorecard(
     config: Mapping[str, Any], records: Mapping[str, Mapping[str, Any]], certificate: Mapping[str, Any],
     policies: Mapping[str, Mapping[str, Any]], scale: Scale, curve: Curve,
-    table: Tabulation | None, horizon: int | None, learned: TabularReward | None,
+    table: Tabulation | None, horizon: int | None, learned: TabularReward | None, limit: int,
 ) -> dict[str, Any]:  # fmt: skip
     """The content of metrics.json.
 
@@ -55,6 +55,7 @@ def scorecard(
         table: None where the environment can only be stepped, as the next two.
         horizon: steps that values count; None for all.
         learned: the recovered reward on the rows of the table.
+        limit: steps after which episodes are cut.
     """
     on_table = {} if table is None or learned is None else judge_reward(learned, table, scale, horizon)
     return {
@@ -62,7 +63,7 @@ def scorecard(
         **scale_told(scale),
         "reward": reward_told(certificate) | learned_told(records["reward"]) | on_table,
         "training": {**training_told(records["agent"]), **settled(curve, scale)},
-        "table": None if table is None else table_told(table, horizon),
+        "table": None if table is None else table_told(table, horizon, limit),
         "demonstrations": shown_told(records["demonstrations"]) | known_by(config) | trained_told(records["expert"])
         | cloned_told(records["clone"]),
     }  # fmt: skip
@@ -167,11 +168,12 @@ def learned_told(record: Mapping[str, Any]) -> dict[str, Any]:
     return told | rounds
 
 
-def table_told(table: Tabulation, horizon: int | None) -> dict[str, Any]:
-    """How big a table is, where it is from, and how far off it can be; and the steps that values count."""
+def table_told(table: Tabulation, horizon: int | None, limit: int | None) -> dict[str, Any]:
+    """How big a table is, where it is from, and how far off it can be; the steps that values count, and that episodes have."""
     mdp, evidence = table.mdp, table.evidence
     return {
         "horizon": horizon,
+        **({} if limit is None else {"limit": limit}),
         "states": mdp.n_states, "reachable": int(mdp.reachable.sum()), "actions": mdp.n_actions,
         "transitions": mdp.P.nnz, "split": evidence.split, "exact": evidence.exact, "method": evidence.method,
         "counted": mdp.visits is not None,

@@ -1,6 +1,7 @@
 """Does `env.step` do what the table says? Sampled, and compared.
 
-A copy of the environment runs with random actions, without its TimeLimit. Three comparisons:
+A copy of the environment runs with random actions, without its TimeLimit, but where the table has a horizon. Three
+comparisons:
     support      a transition that the table says is impossible, or one that ends when the table says it goes on, is an error
     probability  Pearson's chi-square over first states and rows, where each value is expected at least 5 times
     reward       each payment against the table's, exactly; where s, a and s' do not settle it, the mean of each row within
@@ -22,6 +23,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP, entry_positions
 from irl_gym.records import Record
 from irl_gym.spaces.states import States
 from irl_gym.tables.copies.stripped import without_watchers
+from irl_gym.tables.copies.time_limits import with_limits
 
 LEAST_P_VALUE = 1e-9
 """Of the chi-square test and of the rewards' bound. The statistic's tail is heavier than chi-square's where few are
@@ -93,7 +95,7 @@ def compare_with_steps(
         NotTabular: the environment cannot be copied.
         TableMismatch: a step the table says is impossible, or frequencies that it makes all but impossible.
     """
-    walker = copy_of(env)
+    walker = copy_of(env, limits=mdp.horizon is not None)
     rng = generator(seed)
     A = mdp.n_actions
     first_action = int(getattr(walker.action_space, "start", 0))
@@ -128,18 +130,19 @@ def _row_of(states: States, observation: Any, *, terminated: bool) -> int:
         raise TableMismatch(f"the environment showed what the table does not hold: {error} {OUTSIDE}") from error
 
 
-def copy_of(env: gym.Env) -> gym.Env:
-    """A copy without watchers, or the environment made anew where it cannot be copied.
+def copy_of(env: gym.Env, *, limits: bool = False) -> gym.Env:
+    """A copy without watchers, or the environment made anew where it cannot be copied; with its time limits, if they count.
 
     Raises:
         NotTabular: neither can be done.
     """
+    made = with_limits if limits else without_watchers
     try:
-        return without_watchers(env)
+        return made(env)
     except NotTabular as error:
         if env.spec is None:
             raise NotTabular(f"{error} Or pass check_steps=0 to go without the check.") from error
-        return without_watchers(gym.make(replace(env.spec, kwargs={**env.spec.kwargs, "render_mode": None})))
+        return made(gym.make(replace(env.spec, kwargs={**env.spec.kwargs, "render_mode": None})))
 
 
 def _check_start(mdp: TabularMDP, row: int) -> None:

@@ -78,6 +78,7 @@ def save_table(table: Tabulation, path: str | os.PathLike) -> None:
     arrays = dict(
         data=mdp.P.data, indices=mdp.P.indices, indptr=mdp.P.indptr, d0=mdp.d0, gamma=np.array(mdp.gamma),
         visits=none if mdp.visits is None else mdp.visits,
+        horizon=none if mdp.horizon is None else np.array([mdp.horizon]),
         reward=table.reward.values, mean=table.payments.mean, deviation=table.payments.deviation,
         entries=none if table.payments.entries is None else table.payments.entries,
         largest=np.array(table.payments.largest),
@@ -130,7 +131,11 @@ def _rebuilt(found: dict[str, np.ndarray], space: spaces.Space, evidence: Any) -
         found["data"], found["indices"], found["indptr"], (max(found["indptr"].size - 1, 0), d0.size), "P", InvalidMDP
     )  # fmt: skip
     visits = found.get("visits", np.zeros(0))  # tables of earlier versions have none
-    mdp = TabularMDP(P, _number("gamma", found), d0, visits if visits.size else None)
+    horizon = found.get("horizon", np.zeros(0))
+    if horizon.size > 1:
+        raise InvalidMDP(f"its horizon has shape {horizon.shape}: expected one number, or none.")
+    horizon = horizon.item() if horizon.size else None
+    mdp = TabularMDP(P, _number("gamma", found), d0, visits if visits.size else None, horizon)
     rows, copies = (mdp.n_states, mdp.n_actions), found["copies"]
     reward = TabularReward(found["reward"], {"source": "environment"})
     entries = found["entries"] if found["entries"].size else None

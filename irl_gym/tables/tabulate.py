@@ -2,9 +2,9 @@
 
 `tabulate(env, gamma=...)` asks each source in `SOURCES` in turn: an environment that is a table (TabularEnv), the table that an
 environment publishes, rules that are known (Blackjack), a model that the environment offers (gym-classics). Where none answers,
-copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out: truncation is not
-part of an MDP. Then `env.step` is sampled and compared with the table: an exact one step by step, one that is an estimate by
-fresh episodes, as a second sample.
+copies of the environment are enumerated, and where `by` says so its steps are sampled. A TimeLimit stays out, unless a wrapper
+around it reads it: truncation is not part of an MDP. Then `env.step` is sampled and compared with the table: an exact one step
+by step, one that is an estimate by fresh episodes, as a second sample.
 """
 
 import difflib
@@ -38,6 +38,7 @@ from irl_gym.mdp.tabular_mdp import check_discount
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.blackjack import blackjack_table
 from irl_gym.tables.copies.calls import seeded_globals
+from irl_gym.tables.copies.time_limits import limited
 from irl_gym.tables.enumeration.table import Enumeration
 from irl_gym.tables.fresh_episodes import compare_with_episodes
 from irl_gym.tables.observed_integers import as_integers
@@ -79,8 +80,9 @@ def tabulate(
 
     Args:
         env: a Gymnasium environment. A TimeLimit and wrappers that only watch are looked through; LearnedReward gives its
-            reward; other wrappers belong to the environment.
-        gamma: discount in (0, 1); no environment carries one.
+            reward; other wrappers belong to the environment. Where one of these reads a TimeLimit inside it, as
+            TimeAwareObservation does, episodes end at the limit in the table too, whose states have the time in them.
+        gamma: discount in (0, 1); no environment carries one. It may be 1 where a wrapper reads a TimeLimit inside it.
         by: how. None is `Enumeration(known=True)`: what is known of the environment, and enumeration where nothing is.
             `irl_gym.tables.enumeration.table.Enumeration(...)` has limits and can be continued;
             `irl_gym.tables.counted.counting.Interaction(...)` counts what random steps do.
@@ -89,7 +91,7 @@ def tabulate(
         progress: called with two numbers as an enumeration goes on: states tried and found.
 
     Raises:
-        InvalidDiscount: gamma outside (0, 1).
+        InvalidDiscount: gamma outside (0, 1), or 1 of an environment without such a wrapper.
         NotDiscrete: a continuous action or observation space.
         NotTabular: the environment cannot be copied, or something acts outside its table.
         HiddenState: one observation behaves in two ways.
@@ -97,9 +99,10 @@ def tabulate(
         UnknownObservation, InvalidReward: the environment left its own observation space, or paid NaN.
         TableMismatch: `env.step` did what the table says is impossible, or does other things than it did when it was counted.
     """
-    check_discount(gamma)
     if not isinstance(env, gym.Env):
         raise InvalidParameter(f"env is {a_type(env)}: expected an environment, such as gymnasium.make gives.")
+    limit, wrappers = limited(env)
+    check_discount(gamma, limit if wrappers else None)
     for name, value in (("check_steps", check_steps), ("seed", seed)):
         checked_number(name, value, "a whole number of at least 0", least=0, whole=True)
     discrete_actions(env.action_space)

@@ -143,11 +143,20 @@ class Lines:
     """(m,) what such a step pays."""
 
 
-def from_lines(lines: Lines, d0: np.ndarray, n_actions: int, states: States, *, gamma: float, evidence: Evidence) -> Tabulation:
-    """The table of some lines, in which terminal states have none."""
+def from_lines(
+    lines: Lines,
+    d0: np.ndarray,
+    n_actions: int,
+    states: States,
+    *,
+    gamma: float,
+    evidence: Evidence,
+    horizon: int | None = None,
+) -> Tabulation:
+    """The table of some lines, in which terminal states have none; all episodes end within a horizon, where there is one."""
     rows, p, r = lines.rows, lines.probabilities, lines.rewards
     shape = (states.n_states * n_actions, states.n_states)
-    mdp = TabularMDP(sp.coo_array((p, (rows, lines.successors)), shape=shape), gamma, d0)
+    mdp = TabularMDP(sp.coo_array((p, (rows, lines.successors)), shape=shape), gamma, d0, None, horizon)
     R, deviation = moments(rows, p, r, r**2, (states.n_states, n_actions))
     paid = _entry_rewards(mdp.P, rows, lines.successors, p, r)
     payments = Payments(R, deviation, paid, float(np.abs(r).max(initial=0.0)))

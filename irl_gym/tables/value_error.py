@@ -69,7 +69,7 @@ def value_error(table: Tabulation, samples: Samples) -> float | None:
     At most the range of values, which is all that is known where the samples are too few; None where all steps paid the same.
     """
     mdp, (low, high) = table.mdp, samples.rewards
-    most = ((max(high, 0.0) - min(low, 0.0)) if mdp.terminal.any() else high - low) / (1 - mdp.gamma)
+    most = ((max(high, 0.0) - min(low, 0.0)) if mdp.terminal.any() else high - low) * mdp.effective_horizon
     if high == low:
         return None
     V = policy_iteration(mdp, table.reward).V if mdp.n_states <= MOST_PLANNED else None

@@ -93,6 +93,7 @@ def test_an_argument_reaches_the_experiment(arguments, field, expected):
         ({"margin_cap": "auto"}, "margin_cap", "auto"),
         ({"margin_cap": "none"}, "margin_cap", None),
         ({"reward_on": "state-action"}, "reward_on", "state-action"),
+        ({"horizon": 8}, "horizon", 8),
         ({}, "slack", None),
         ({"epsilon": 0.1}, "slack", 1.0),
         ({"epsilon": 0.1, "slack": "none"}, "slack", None),

@@ -44,6 +44,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.programs.deadline import Deadline
 from irl_gym.programs.killable import called, within
 from irl_gym.spaces.states import StateIndex
+from irl_gym.tables.tabulate import tabulate
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 MODEL, SAME, SWAPPING = random_model(1, S=5), ring([[1, 1], [0, 0]]), ring([[1, 0], [0, 1]])
@@ -59,6 +60,16 @@ ONCE = np.outer(np.arange(5) < 2, np.arange(3.0))
 
 def fit(mdp=MODEL.mdp, expert=MODEL.expert, visits=None, **how):
     return FiniteLP(**how).fit(mdp, expert, visits=visits)
+
+
+def to_and_fro(**how):
+    """Between two states, to stay at last."""
+    return FiniteLP(horizon=3, **how).fit(ring([[0, 1], [1, 0]]), np.array([[0, 1], [1, 0], [0, 1]]))
+
+
+def with_the_time_shown():
+    table = tabulate(gymnasium.wrappers.TimeAwareObservation(gymnasium.make("FrozenLake-v1", max_episode_steps=7)), gamma=1.0)
+    return FiniteLP(horizon=None).learn(Problem.of(table, expert=policy_iteration(table.mdp, table.reward).policy))
 
 
 def on_features(features, S_0, mdp, expert):
@@ -193,6 +204,13 @@ CASES = [
      lambda: fit(SWAPPING, FIRST), lambda: fit(SWAPPING, FIRST, **STEPS)),
     ('every reward makes it optimal. Use reward_on="state-action".',
      lambda: fit(SAME, HALF), lambda: fit(SAME, HALF, **STEPS)),
+    ("Use stationary=False; or leave out the horizon.",
+     lambda: fit(expert=PARTLY, horizon=3),
+     lambda: fit(expert=PARTLY, horizon=3, stationary=False) and fit(expert=PARTLY)),
+    ("Use stationary=False.", lambda: to_and_fro(), lambda: to_and_fro(stationary=False)),
+    ("Call `FiniteLP.fit`; or have the time shown, with `gymnasium.wrappers.TimeAwareObservation(env)` and horizon=None.",
+     lambda: FiniteLP(horizon=3, stationary=False).learn(Problem.of(MODEL.mdp, expert=MODEL.expert)),
+     lambda: fit(horizon=3, stationary=False) and with_the_time_shown()),
     ("More demonstrations may tell.",
      lambda: fit(CONTRADICTED, UNKNOWN_LAST), lambda: fit(CONTRADICTED, np.zeros(5, int))),
     ('Use reward_on="state-action".',

@@ -77,7 +77,7 @@ def test_every_policy_has_a_row_with_its_numbers(finished):
     heads, *rows = Tags(run._repr_html_()).rows
     assert heads[:4] == ["policy", "value", "score", "mean return (95 %)"]
     assert [row[0] for row in rows] == ["expert", "random", "clone", "retrained agent"]
-    assert all(row[4].endswith("\N{NO-BREAK SPACE}%") for row in rows)  # agreement
+    assert all(row[5].endswith("\N{NO-BREAK SPACE}%") for row in rows)  # agreement
     assert [float(row[1]) for row in rows] == pytest.approx(
         [one["value"] for one in run.metrics["policies"].values()], abs=1e-3
     )

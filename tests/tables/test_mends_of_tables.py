@@ -31,7 +31,8 @@ from irl_gym.mdp.planning.dynamic_programming import value_iteration
 from irl_gym.mdp.policies import TabularPolicy, as_distribution
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.sampling import Successors
-from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable
+from irl_gym.mdp.time_expanded import time_expanded
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.counted.counting import Counting
 from irl_gym.tables.discretize import discretize
@@ -231,6 +232,8 @@ CASES = [
      lambda _: Successors(TabularMDP(P, GAMMA, np.eye(16)[15])), lambda _: Successors(TabularMDP(P, GAMMA, np.eye(16)[14]))),
     ("Normalise the rows.", lambda _: TabularMDP(ONE * (1 + 5e-10), 1 - 1e-10, [1.0]),
      lambda _: TabularMDP(ONE, 1 - 1e-10, [1.0])),
+    ("Put the time in the states, with `irl_gym.mdp.time_expanded.time_expanded(TransitionTable(P, d0), horizon)`.",
+     lambda _: TabularMDP(P, 1.0, MDP.d0, horizon=6), lambda _: time_expanded(TransitionTable(P, MDP.d0), 6).horizon),
     ("Raise it, or `tolerance`.",
      lambda _: value_iteration(MDP, LAKE.reward, max_iterations=1, sweeps=0),
      lambda _: value_iteration(MDP, LAKE.reward, sweeps=0),

@@ -9,11 +9,13 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from enumeration_envs import Board, Corridor, Lamps, Slippery
 from gymnasium import spaces
 from tiny_env import TableEnv, both_ways, lottery
 
 from irl_gym.errors import InvalidMDP, InvalidParameter
+from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.tables.counted.counting import Interaction
 from irl_gym.tables.discretize import discretize
 from irl_gym.tables.enumeration.table import Enumeration
@@ -269,3 +271,11 @@ def test_a_table_that_is_no_mdp_is_refused(table, tmp_path):
         np.savez(file, **parts | {"data": parts["data"] * 0.9})
     with pytest.raises(InvalidMDP, match=r"sums to 0\.9"):
         load_table(path, spaces.Discrete(16))
+
+
+def test_a_horizon_comes_back_with_its_table(table, tmp_path):
+    one = table("enumerated")
+    finite = replace(one, mdp=TabularMDP(sp.csr_array(one.mdp.P.shape), 1.0, one.mdp.d0, horizon=3))
+    bare = replace(finite, payments=replace(one.payments, entries=None))
+    back = load_table(saved(bare, tmp_path / "table.npz"), one.states.space)
+    assert (back.mdp.horizon, back.mdp.gamma) == (3, 1.0)

@@ -199,7 +199,7 @@ def _acting_best(posed: Posed, R: TabularReward) -> Posed:
     if posed.known.all():
         return posed
     part, told = posed.part, posed.comparisons.distribution
-    as_expert = TabularMDP(as_told(part, told, ~posed.known), part.gamma, part.d0)
+    as_expert = TabularMDP(as_told(part, told, ~posed.known), part.gamma, part.d0, None, part.horizon)
     paid = R.expected(part)
     paid = np.where(posed.known[:, None], (told * paid).sum(axis=1, keepdims=True), paid)
     best = optimum(as_expert, paid).policy

@@ -71,7 +71,7 @@ class StateRewards(RewardSet):
         part, c = posed.part, posed.comparisons
         S, A = part.n_states, part.n_actions
         self.n_states, self.n_actions, self.pins = S, A, pins
-        self.largest_value = 1 / (1 - part.gamma)
+        self.largest_value = part.effective_horizon
         self.closed, self.opened = np.flatnonzero(posed.known), np.flatnonzero(~posed.known)
         self.here: Sparse = sp.csr_array(sp.eye_array(S) - part.gamma * part.P_pi(c.distribution))[self.closed]  # R, (5)
         states = self.opened.repeat(A)
@@ -124,7 +124,7 @@ class StepRewards(RewardSet):
         part = posed.part
         S, A = part.n_states, part.n_actions
         self.shape, self.terminal, self.pins = (S, A), part.terminal, pins
-        self.largest_value = 1 / (1 - part.gamma)
+        self.largest_value = part.effective_horizon
         acting = np.flatnonzero(~part.terminal)
         self.pairs = (acting[:, None] * A + np.arange(A)).ravel()
         self.taken = posed.taken.ravel()[self.pairs]

@@ -146,7 +146,7 @@ class Case:
         """Differences of values from the start up to this are rounding, under the true reward; 0 where it is not known."""
         if self.mdp is None or self.true_optimum is None:
             return 0.0
-        size = float(self.mdp.d0 @ np.abs(self.true_optimum.V)) / (1 - self.mdp.gamma)
+        size = float(self.mdp.d0 @ np.abs(self.true_optimum.V)) * self.mdp.effective_horizon
         return float(self.mdp.d0 @ self.true_optimum.error) + 64 * EPSILON * size
 
     @cached_property
@@ -160,7 +160,7 @@ class Case:
         keep = self.states
         part = self.mdp.restrict(keep)
         if gamma is not None:
-            part = TabularMDP(part.P, gamma, part.d0, part.visits)
+            part = TabularMDP(part.P, gamma, part.d0, part.visits, part.horizon)
         c = compare(part, self.distribution[keep], np.flatnonzero((self.known & self.acting)[keep]))
         nothing, errors = np.full(c.states.size, np.nan), np.zeros(c.states.size)
         margins = Margins(nothing, nothing, nothing, nothing, nothing > 0, nothing > 0, nothing)

@@ -85,14 +85,16 @@ def _choices_vanish(case: Case, gamma: float | None) -> np.ndarray | None:
     """Acting states in which the best and the worst action differ by less under the true reward."""
     if case.true is None or case.mdp is None:
         return None
-    mdp = case.mdp if gamma is None else TabularMDP(case.mdp.P, gamma, case.mdp.d0, case.mdp.visits)
+    mdp = case.mdp if gamma is None else TabularMDP(case.mdp.P, gamma, case.mdp.d0, case.mdp.visits, case.mdp.horizon)
     Q = policy_iteration(mdp, case.true).Q[case.acting]
     return np.asarray(Q.max(axis=1) - Q.min(axis=1) <= VANISHED * case.true.largest(mdp))
 
 
 def gamma_near_one(case: Case) -> Finding | None:
     """I - gamma P_pi has a condition number of about 1 / (1 - gamma), by which rounding and solvers' residuals grow in V."""
-    if case.mdp is None or case.scale == 0 or not case.speaks or (told := case.optimality) is None:
+    if case.mdp is None or case.mdp.horizon is not None or case.scale == 0 or not case.speaks:
+        return None
+    if (told := case.optimality) is None:
         return None
     margins, left_open = told.margin[told.margin > 0], _left_open(case.scale, case.mdp.gamma)
     if not margins.size or left_open <= max(VANISHED * case.scale, 0.1 * (typical := float(np.median(margins)))):

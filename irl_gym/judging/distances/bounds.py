@@ -66,7 +66,7 @@ def epic_bound(mdp: TabularMDP, true: Any, learned: Any) -> RegretBound:
     gains = [policy_value(mdp, expected[0], policy) for policy in policies]
     K = max(_most_likely(mdp, policy) for policy in policies) * S * A * S
     distance = EPIC(uniform).distance(mdp, true, learned)
-    scale = K * distance / (1 - mdp.gamma)
+    scale = K * distance * mdp.effective_horizon
     deviation = norm(canonical - coverage.weights @ canonical, coverage.weights, 2)
     return RegretBound(gains[0] - gains[1], 16 * norm(paid, coverage.weights, 2) * scale, 4 * deviation * scale, distance, K)
 

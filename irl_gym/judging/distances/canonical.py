@@ -86,7 +86,7 @@ class FreshDraws:
 
     def rounding(self, mdp: TabularMDP, reward: StepPayments, coverage: Coverage) -> float:
         """Every triple out of a state that acts is read."""
-        return reward.precision * reward.largest(~mdp.terminal) / (1 - mdp.gamma)
+        return reward.precision * reward.largest(~mdp.terminal) * mdp.effective_horizon
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ def _rounding(mdp: TabularMDP, reward: StepPayments, coverage: Coverage, levelle
     """What rounding leaves of values of a policy, and of what is computed from them."""
     read = [coverage_of(mdp, None)] if levelled else [coverage_of(mdp, None), coverage]
     largest = max(float(np.abs(AsGiven().values(mdp, reward, which)).max()) for which in read)
-    return reward.precision * largest / (1 - mdp.gamma)
+    return reward.precision * largest * mdp.effective_horizon
 
 
 def _shaped_values(

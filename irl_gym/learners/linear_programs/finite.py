@@ -18,6 +18,8 @@ rows in the states where it is known, and V is what acting best is worth, so tha
 no unknown state is worth more than it earns.
 `unvisited="avoid"`  (default) unknown states have the lowest reward that the margins allow, so an agent that strays into them
     returns to what the expert was seen to do. It is a choice, not knowledge: nothing says that these states are bad.
+`horizon=H`  sums of H steps, undiscounted, for an expert that is known at each time (`finite_within`): one reward R(s) for all
+    times, or R_h(s).
 `slack=C`  a violation of (4) costs C, where a margin is worth 1, both in proportion to `visits`. With C large the rows are hard
     again wherever they can hold. `irl_gym.certify` lists the rows that are violated.
     Actions that the expert takes too, when it takes several, have to be as good: what violates that costs C as well, and adds
@@ -30,31 +32,28 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from irl_gym.checks import checked_number, is_word
-from irl_gym.errors import DegenerateExpert, InvalidParameter, SolverFailed, SolverInfeasible, a_type
+from irl_gym.checks import checked_flag, checked_number, is_word
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.linear_programs import programs
+from irl_gym.learners.linear_programs.finite_task import FiniteTask
+from irl_gym.learners.linear_programs.finite_within import Within, not_known
 from irl_gym.learners.linear_programs.partial import PartialTask
 from irl_gym.learners.linear_programs.programs import (
     JUST_BELOW,
-    LARGEST_BOUND,
     NO_MARGIN,
-    Program,
     RewardOn,
-    Solved,
     checked_visits,
 )
-from irl_gym.learners.linear_programs.proofs.finite_proof import FiniteProof, prove
-from irl_gym.learners.linear_programs.strict_rows import nothing_to_compare, strict_rows
+from irl_gym.learners.linear_programs.proofs.finite_proof import FiniteProof
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
-from irl_gym.mdp.margins import row_margins
-from irl_gym.mdp.optimality_rows import Comparisons, compare
 from irl_gym.mdp.policies import completed
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
+from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable, checked_horizon, checked_mdp
+from irl_gym.mdp.time_expanded import Repeated
 from irl_gym.programs.killable import within
-from irl_gym.programs.solvers import SolverName, Solving, Status, check_solving
+from irl_gym.programs.solvers import SolverName, Solving, check_solving
 from irl_gym.records import Record
 
 
@@ -86,11 +85,20 @@ class FiniteLP(Record):
     """C >= 1, the price of violating (4), where a margin is worth 1: for experts that err. None: (4) holds at any cost."""
     unvisited: Literal["avoid", "free"] = "avoid"
     """Reward of states where nothing is known of the expert: as low as the margins allow, or whatever they make of it."""
+    horizon: int | None = None
+    """H, steps of an episode, whose sums are undiscounted whatever gamma is (lecture notes, section 1.1); None for discounted
+    sums without end."""
+    stationary: bool = True
+    """With a horizon: one reward for all times. False: R_h(s), on the rows of `irl_gym.mdp.time_expanded`."""
     needs: ClassVar[Needs] = Needs(("dynamics", "expert or demonstrations"), actions="inferred")
     """The parts of a problem that `learn` reads."""
-    of_feasible_set: ClassVar[bool] = True
-    """Is the reward one of those that `irl_gym.judging.ambiguity` describes, by how far they reach and how they depend on
-    lambda?"""
+
+    @property
+    def of_feasible_set(self) -> bool:
+        """Is the reward one of those that `irl_gym.judging.ambiguity` describes, by how far they reach and how they depend on
+        lambda? These are of discounted sums.
+        """
+        return self.horizon is None
 
     def __post_init__(self) -> None:
         checked_number("r_max", self.r_max, "a bound above 0, such as 1.0", above=0)
@@ -103,6 +111,9 @@ class FiniteLP(Record):
             raise InvalidParameter(f"reward_on is {self.reward_on!r}: expected 'state' or 'state-action'.")
         if not is_word(self.unvisited, "avoid", "free"):
             raise InvalidParameter(f"unvisited is {self.unvisited!r}: expected 'avoid' or 'free'.")
+        checked_flag("stationary", self.stationary)
+        if self.horizon is not None:
+            checked_horizon(self.horizon)
         if self.slack is not None:
             checked_number("slack", self.slack, "a price of at least 1, or None for hard rows", least=1)
             if self.reward_on == "state-action":
@@ -119,18 +130,26 @@ class FiniteLP(Record):
             InvalidDemonstrations: a reward on steps, and actions that states do not tell apart.
         """
         known = self.needs.of(problem, self)
+        if self.horizon is not None and not self.stationary:
+            raise InvalidParameter(
+                "stationary is False, and the reward would have another number of states than the problem: expected True. Call "
+                "`FiniteLP.fit`; or have the time shown, with `gymnasium.wrappers.TimeAwareObservation(env)` and horizon=None."
+            )
         if self.reward_on == "state-action" and known.inferred is not None:
             known.inferred.check_apart()
         return replace(self.fit(checked_mdp(known.dynamics), known.policy, visits=known.visits), inferred=known.inferred)
 
-    def fit(self, mdp: TabularMDP, expert: Any, *, visits: np.ndarray | None = None) -> Outcome[TabularReward, FiniteProof]:
+    def fit(
+        self, mdp: TabularMDP | TransitionTable, expert: Any, *, visits: np.ndarray | None = None
+    ) -> Outcome[TabularReward, FiniteProof]:
         """Learn a reward under which the expert is optimal.
 
         Args:
-            mdp: only states reachable from d0 get a reward; the others get 0 and are not judged.
-            expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions. Rows of NaN say that nothing is known
-                of the expert in a state, as in the tables of `irl_gym.demonstrations.demonstrated`: such a state has no row of
-                (4).
+            mdp: only states reachable from d0 get a reward; the others get 0 and are not judged. With a horizon any
+                TransitionTable, whose discount is not taken.
+            expert: (S,) actions, (S, A) probabilities, or (S, A) set of optimal actions; with a horizon also (H, S) or
+                (H, S, A), which depend on the time. Rows of NaN say that nothing is known of the expert in a state, as in the
+                tables of `irl_gym.demonstrations.demonstrated`: such a state has no row of (4).
             visits: (S,) how often the expert was seen in each state: what its margin and its violation count for. Where the
                 expert is known everywhere and slack is None they change nothing. No state with visits is avoided.
 
@@ -142,17 +161,24 @@ class FiniteLP(Record):
         """
         solving = Solving.begun(self.solver, self.time_limit)
         with within(solving.deadline):
-            return self._fit(checked_mdp(mdp), expert, visits, solving)
+            if self.horizon is None:
+                return self._fit(checked_mdp(mdp), expert, visits, solving)
+            posed = Within(mdp, expert, visits, self.horizon)
+            if not self.stationary:
+                return self._fit(posed.mdp, posed.expert, posed.visits, solving)
+            return posed.told(self._fit(posed.mdp, posed.expert, posed.visits, solving, posed.tie(self.reward_on)))
 
     def _fit(
-        self, mdp: TabularMDP, expert: Any, visits: np.ndarray | None, solving: Solving
+        self, mdp: TabularMDP, expert: Any, visits: np.ndarray | None, solving: Solving, tie: Repeated | None = None
     ) -> Outcome[TabularReward, FiniteProof]:
         known_expert, known = completed(expert, mdp.n_states)
         acting = mdp.reachable & ~mdp.terminal
         visits = checked_visits(visits, known & acting)
         if self.slack is not None or (acting & ~known).any():
+            if tie is not None:
+                raise not_known()
             return PartialTask(self, mdp, known_expert, known, visits, solving).fit()
-        task, y_l1 = _Task(self, mdp, known_expert, solving), None
+        task, y_l1 = FiniteTask(self, mdp, known_expert, solving, tie), None
         largest = None if self.margin_cap is None else task.uniform_margin()
         lambda_0 = task.lambda_0() if self.l1 == "auto" or self.l1 > 0 or self.report_lambda_0 else None
         l1 = JUST_BELOW * lambda_0 if self.l1 == "auto" and lambda_0 is not None else float(self.l1)
@@ -182,119 +208,31 @@ class FiniteLP(Record):
         """
         solving = Solving.begun(self.solver, self.time_limit)
         with within(solving.deadline):
+            tie = None
+            if self.horizon is not None:
+                posed = Within(mdp, expert, None, self.horizon)
+                mdp, expert, tie = posed.mdp, posed.expert, posed.tie(self.reward_on) if self.stationary else None
             expert, known = completed(expert, mdp.n_states)
             if self.slack is not None or (mdp.reachable & ~mdp.terminal & ~known).any():
+                if tie is not None:
+                    raise not_known()
                 partial = PartialTask(self, mdp, expert, known, None, solving)
                 partial.settle()
                 return partial.lambda_0()
-            task = _Task(self, mdp, expert, solving)
+            task = FiniteTask(self, mdp, expert, solving, tie)
             if self.margin_cap is not None:
                 task.uniform_margin()
             return task.lambda_0()
 
 
 def checked_finite(learner: Any) -> FiniteLP:
-    """A FiniteLP as it is, for who works on its program.
+    """A FiniteLP as it is, for who works on its program of discounted sums.
 
     Raises:
-        InvalidParameter: another learner.
+        InvalidParameter: another learner, or one with a horizon.
     """
     if not isinstance(learner, FiniteLP):
         raise InvalidParameter(f"learner is {a_type(learner)}: expected a FiniteLP, whose program it is.")
+    if learner.horizon is not None:
+        raise InvalidParameter(f"learner has the horizon {learner.horizon}: expected None, as in the program that is asked of.")
     return learner
-
-
-class _Task:
-    """One fit: the reachable part of the MDP, the rows of (4), and the states that count."""
-
-    def __init__(self, learner: FiniteLP, mdp: TabularMDP, expert: Any, solving: Solving):
-        self.learner, self.mdp, self.expert, self.solving = learner, mdp, expert, solving
-        mdp.mixing(expert)  # checks all states, reachable or not
-        self.rows = np.flatnonzero(mdp.reachable)
-        self.part = mdp.restrict(self.rows)
-        self.comparisons: Comparisons = compare(self.part, np.asarray(expert)[self.rows])
-        self.stats: dict[str, Any] = {"programs": {}}
-        self.counted = self._candidates()
-        self.unbreakable = np.zeros_like(self.counted)
-        if not self.counted.any():
-            raise nothing_to_compare(self.comparisons, self.part)
-
-    def _candidates(self) -> np.ndarray:
-        """(n,) rows that can have a margin: in the paper's LP a trivial row takes it from all rows of its state."""
-        c = self.comparisons
-        if self.learner.reward_on == "state-action":
-            return ~c.equal
-        usable = ~c.equal & ~c.trivial
-        if self.learner.margin_cap is None:
-            usable &= ~np.isin(c.states, c.states[c.trivial & ~c.equal])
-        return usable
-
-    def program(self) -> Program:
-        learner = self.learner
-        return Program(self.part, self.comparisons, learner.reward_on, self.counted, self.solving)
-
-    def record(self, name: str, solved: Solved) -> None:
-        self.stats["programs"][name] = solved.answer.to_json()
-
-    def lambda_0(self) -> float:
-        solved = programs.critical_l1(self.program())
-        self.record("lambda_0", solved)
-        if solved.answer.objective <= NO_MARGIN:
-            raise self.degenerate()
-        return solved.answer.objective
-
-    def uniform_margin(self) -> float:
-        """The largest margin of all rows at once; leaves in `counted` the rows that can have one."""
-        bound = self._uniform_bound()
-        if bound is None:
-            candidates = self.counted
-            self.counted = strict_rows(self.comparisons.states, candidates, self._serve)
-            self.unbreakable = candidates & ~self.counted
-            self.stats["rows_without_margin"] = int(self.unbreakable.sum())
-            if not self.counted.any():
-                raise self.degenerate()
-            rounds = self.part.n_actions  # rewards of that many programs add up, each with margins above 1/2 at the bound
-            bound = self._uniform_bound((2 * rounds + 1) * LARGEST_BOUND)
-            if bound is None:
-                raise SolverFailed("the rows that can have a margin were found, but no uniform margin: report this table.")
-        self.stats["uniform_margin"] = self.learner.r_max / bound
-        return self.learner.r_max / bound
-
-    def _serve(self, rows: np.ndarray) -> np.ndarray:
-        self.counted = rows
-        solved = programs.attainable(self.program(), LARGEST_BOUND)
-        self.record("attainable", solved)
-        return row_margins(self.part, self.comparisons, TabularReward(solved.R))
-
-    def _uniform_bound(self, largest: float = LARGEST_BOUND) -> float | None:
-        """Least bound on |R| for margins of 1 in all counted rows; None if there is none, or only a larger one."""
-        try:
-            solved = programs.uniform_margin(self.program())
-        except SolverInfeasible:
-            return None
-        self.record("uniform margin", solved)
-        return solved.answer.objective if 0 < solved.answer.objective < largest else None
-
-    def l1_limit(self, y: np.ndarray) -> float:
-        """An l1 below which the sparsest reward stays optimal: where no margin's price in ||R||_1, times l1, is above 1."""
-        prices = np.bincount(self.comparisons.states[self.counted], np.maximum(y[self.counted], 0))
-        return 1 / max(float(prices.max()), 1e-300)
-
-    def degenerate(self) -> DegenerateExpert:
-        where = "state reward" if self.learner.reward_on == "state" else "reward"
-        mend = ' Use reward_on="state-action".' if self.learner.reward_on == "state" else ""
-        return DegenerateExpert(
-            f"equation (4) holds for this expert only with every margin 0, as for R = constant: no {where} over the "
-            f"{self.rows.size} reachable states prefers its actions. Is the policy optimal for any reward at all?{mend}"
-            f"{self.comparisons.caveat if self.learner.reward_on == 'state' else ''}"
-        )
-
-    def result(self, solved: Solved, **proof: Any) -> Outcome[TabularReward, FiniteProof]:
-        values = np.zeros((self.mdp.n_states, *solved.R.shape[1:]))
-        if np.abs(solved.R).max() > NO_MARGIN * self.learner.r_max:  # below, it is 0 and an interior point's rounding
-            values[self.rows] = solved.R
-        reward = TabularReward.learned(values, {"learner": "FiniteLP", "reward_on": self.learner.reward_on})
-        never = self.comparisons.pairs(self.rows, np.flatnonzero(self.unbreakable))
-        terms = {"r_max": self.learner.r_max, "unbreakable_rows": never, **proof}
-        found = prove(self.part, self.comparisons, reward.of_rows(self.rows), self.counted, **terms)
-        return Outcome(reward, Status.ZERO if found.zero else solved.answer.status, found, self.stats)

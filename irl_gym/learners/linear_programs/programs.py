@@ -22,6 +22,7 @@ from irl_gym.checks import float_array
 from irl_gym.errors import InvalidParameter
 from irl_gym.mdp.optimality_rows import Comparisons
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.time_expanded import Repeated
 from irl_gym.programs.solvers import Answer, Solving, solve
 
 RewardOn = Literal["state", "state-action"]
@@ -38,7 +39,7 @@ class Solved:
     """A solved program: the reward, the duals of (4) and of the margins, and how the solver did."""
 
     R: np.ndarray
-    """(S,) or (S, A)."""
+    """(S,) or (S, A); of a tie its k numbers."""
     y: np.ndarray
     """(n,) dual of each row of (4), >= 0 where the row is an inequality."""
     answer: Answer
@@ -53,10 +54,17 @@ class Program:
         reward_on: what the reward is a function of.
         rows: (n,) booleans, the rows that count towards margins; their states are those with a margin.
         solving: with which solver, and until when.
+        tie: of a reward that is the same in several rows; None where each has its own.
     """
 
-    def __init__(self, mdp: TabularMDP, comparisons: Comparisons, reward_on: RewardOn, rows: np.ndarray, solving: Solving):
+    def __init__(
+        self, mdp: TabularMDP, comparisons: Comparisons, reward_on: RewardOn, rows: np.ndarray, solving: Solving,
+        tie: Repeated | None = None,
+    ):  # fmt: skip
         self.shape = (mdp.n_states,) if reward_on == "state" else (mdp.n_states, mdp.n_actions)
+        if tie is not None:
+            self.shape = tie.used.shape
+        told = None if tie is None else cp.Variable(tie.used.size)
         self.solving = solving
         self.equal = comparisons.equal
         self.counted = rows
@@ -67,10 +75,12 @@ class Program:
         self.constraints: list[Any] = []
         if reward_on == "state":
             self.R: Any = closing @ V  # (5)
+            if tie is not None:
+                self.constraints += [self.R == tie.at @ told]
             self.margins = comparisons.rows @ V  # (4)
         else:
-            self.R = cp.Variable(mdp.n_states * mdp.n_actions)
-            unit = 1 / (1 - mdp.gamma)  # weighs (5), so that its residual is not multiplied by this in V
+            self.R = cp.Variable(mdp.n_states * mdp.n_actions) if tie is None else tie.at @ told
+            unit = mdp.effective_horizon  # weighs (5), so that its residual is not multiplied by this in V
             here_R = sp.csr_array(unit * mdp.mixing(comparisons.distribution))
             self.constraints += [sp.csr_array(unit * closing) @ V == here_R @ self.R]  # (5) on steps
             stacked = comparisons.states * mdp.n_actions + comparisons.actions
@@ -78,8 +88,10 @@ class Program:
             pair = picking(stacked, mdp.n_states * mdp.n_actions)
             self.margins = sp.csr_array(here - mdp.gamma * mdp.P[stacked]) @ V - pair @ self.R
             ended = np.repeat(mdp.terminal, mdp.n_actions)
-            if ended.any():
+            if ended.any() and tie is None:
                 self.constraints += [self.R[np.flatnonzero(ended)] == 0]
+        if tie is not None:
+            self.R = told
 
     @property
     def n_margins(self) -> int:

@@ -159,7 +159,7 @@ class _Parts:
     def __init__(self, program: SoftProgram, bound: float | None, *, priced: bool, gains: bool):
         self.of, self.bound, self.priced = program, bound, priced
         partly = program.partly
-        S, A, gamma = partly.mdp.n_states, partly.mdp.n_actions, partly.mdp.gamma
+        S, A = partly.mdp.n_states, partly.mdp.n_actions
         n_steps = int(program.stepped.sum()) * A
         self.steps = slice(S, S + n_steps)
         parts = S + n_steps if priced or n_steps else 0
@@ -177,7 +177,8 @@ class _Parts:
         self.where = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(sizes)}
         self.sizes: Mapping[str, int] = sizes
         largest = np.inf if bound is None else bound
-        value, most = largest / (1 - gamma), 2 * largest / (1 - gamma)
+        value = largest * partly.mdp.effective_horizon
+        most = 2 * value
         boxes = {"V": value, "t": most, "xi": most, "eta": most, "pos": largest, "neg": largest, "bound": np.inf}
         self.cost = {name: np.zeros(size) for name, size in sizes.items()}
         self.lower = {name: np.full(size, -np.inf if name == "V" else 0.0) for name, size in sizes.items()}
@@ -235,7 +236,7 @@ class _Parts:
         self._below(opened, sp.csr_array(-r_a), "neg")
         stepped = np.flatnonzero(program.stepped)
         if stepped.size:
-            unit = 1 / (1 - mdp.gamma)  # weighs (5), so that its residual is not multiplied by this in V
+            unit = mdp.effective_horizon  # weighs (5), so that its residual is not multiplied by this in V
             mixing: Any = sp.csr_array(unit * partly.mdp.mixing(partly.comparisons.distribution)[stepped])
             columns = (stepped[:, None] * A + np.arange(A)).ravel()
             here = sp.csr_array(sp.hstack([sp.csr_array((stepped.size, S)), mixing[:, columns]]))

@@ -15,7 +15,7 @@ from irl_gym.checks import checked_number, float_array
 from irl_gym.errors import InvalidParameter, InvalidReward
 from irl_gym.mdp.planning.discounted import EPSILON, Discounted
 from irl_gym.mdp.planning.howard import Optimum, howard, sweeps_of
-from irl_gym.mdp.planning.precise import horizon
+from irl_gym.mdp.planning.precise import effective_horizon
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward, check_reward_itself
 from irl_gym.mdp.tabular_mdp import TabularMDP, checked_mdp
@@ -134,7 +134,7 @@ def value_iteration(
         InvalidParameter: a tolerance below what float64 can reach, or `max_iterations` spent.
     """
     R = checked_reward(mdp, R)
-    steps = horizon(mdp)
+    steps = effective_horizon(mdp)
     scale = max(float(np.abs(R).max(initial=0.0)) * steps, 1e-290)
     terms = int(np.diff(mdp.P.indptr).max(initial=0)) + 4
     rounding = terms * EPSILON * scale * steps

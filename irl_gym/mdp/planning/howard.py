@@ -25,7 +25,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP
 TIED = 4 * EPSILON
 """What rounding makes of a sum, as a share of its terms: 1/3 + 1/3 + 1/3 need not be 1 in a table of float64."""
 CAREFUL = 1e-10
-"""Share of the terms, times 1 - gamma, up to which a policy takes an action for tied: each of its many steps pays the loss."""
+"""Share of the terms, by the steps that pay for it, up to which a policy takes an action for tied."""
 WORTHWHILE = 1e-15
 """Share of the same terms below which nothing is improved."""
 LAST_IMPROVEMENTS = 30
@@ -156,7 +156,7 @@ class Optimum:
         """(S, A) the actions that a policy may take for the best: tied, and the closer the more steps pay for it."""
         gains = np.where(self.blocked, -np.inf, self.advantages.values)
         best = gains.max(axis=1, keepdims=True)
-        near = gains >= best - CAREFUL * (1 - self.table.mdp.gamma) * self.advantages.size
+        near = gains >= best - CAREFUL / self.table.mdp.effective_horizon * self.advantages.size
         if not (near.sum(axis=1) > 1)[~self.table.mdp.terminal].any():  # no need of a factorisation
             return near
         return near & (gains >= best - self.level)
@@ -187,7 +187,7 @@ def howard(mdp: TabularMDP, reward: TabularReward, blocked: np.ndarray, max_iter
     """
     R, states, seen = reward.expected(mdp), np.arange(mdp.n_states), set()
     paid = np.abs(R)
-    if paid.max() > LARGEST * (1 - mdp.gamma):
+    if paid.max() > LARGEST / mdp.effective_horizon:
         raise InvalidReward(f"the reward is up to {paid.max():.3g}, too large at gamma {mdp.gamma}: values overflow. Scale it.")
     policy = _warm_start(mdp, R, blocked)
     for iteration in range(1, max_iterations + 1):

@@ -73,7 +73,7 @@ class PreciseTable:
         self.steps = reward.expected(mdp)
         """(S, A) what a step pays, in float64."""
         self._defects = row_defects(mdp.P)
-        self.horizon = horizon(mdp)
+        self.horizon = effective_horizon(mdp)
         """Discounted steps at most."""
         paid = np.abs(reward.values)
         if reward.on_states:
@@ -127,9 +127,12 @@ class PreciseTable:
         return W
 
 
-def horizon(mdp: TabularMDP) -> float:
-    """Discounted steps at most: 1 / (1 - gamma), but for rows whose sum is not quite 1; infinite where they are too far off."""
-    ends = (1 - mdp.gamma) - mdp.gamma * max(float(row_defects(mdp.P).max(initial=0.0)), 0.0)
+def effective_horizon(mdp: TabularMDP) -> float:
+    """That of the MDP, but for rows whose sum is not quite 1; infinite where they are too far off."""
+    more = max(float(row_defects(mdp.P).max(initial=0.0)), 0.0)
+    if mdp.horizon is not None:
+        return mdp.effective_horizon * (1 + 4 * EPSILON) * np.exp(min(mdp.horizon * more, 600.0))
+    ends = (1 - mdp.gamma) - mdp.gamma * more
     return (1 + 4 * EPSILON) / ends if ends > 0 else float("inf")
 
 

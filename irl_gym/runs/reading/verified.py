@@ -47,7 +47,7 @@ ROUNDING = 1e-9
 WITHIN = 1e-6
 """Share of the largest value by which two computations of one value may differ."""
 MOST_STEPS = 100_000
-"""Of a horizon that values are computed again for."""
+"""Of a horizon or a limit that values are computed again for."""
 FILES = {RETRAINED: "agent_policy.npz", LEARNED: "learned_policy.npz", CLONE: "clone_policy.npz"}
 """Where the policies of a table are that are judged by expert and random actions."""
 EVIDENCE = ("method", "counted", "error", "reward_error", "value_error", "errors", "hidden_state", "checked")
@@ -117,7 +117,8 @@ def claims(
     yield Claim(".stages/agent.json", {"training": training_told(stages["agent"])})
     yield Claim("certificate.json", {"reward": reward_told(certificate)})
     if table is not None:
-        told = table_told(table, metrics["table"].get("horizon") if known["given"] else None)
+        recorded = metrics["table"]
+        told = table_told(table, recorded.get("horizon") if known["given"] else None, recorded.get("limit"))
         yield Claim("table.npz", {"table": {key: one for key, one in told.items() if key not in EVIDENCE}})
 
 
@@ -159,7 +160,7 @@ def again(
     config: Mapping[str, Any], metrics: Mapping[str, Any], table: Tabulation, expert: Any, agents: Mapping[str, Any],
     reward: TabularReward | None, curve: Curve,
 ) -> tuple[list[Claim], dict[str, Any]] | None:  # fmt: skip
-    """The values of a run's policies as claims, and what of metrics.json is told as computed now; None at a horizon too long.
+    """The values of a run's policies as claims, and what is told as computed now; None where steps are too many.
 
     Args:
         config: the run's.
@@ -176,8 +177,8 @@ def again(
     """
     if config.get("gamma") != table.mdp.gamma:
         raise InvalidDiscount(f"the table has gamma {table.mdp.gamma}: expected {config.get('gamma')}, as config.json has")
-    mdp, told, horizon = table.mdp, metrics["policies"], metrics["table"].get("horizon")
-    if horizon is not None and not 0 <= horizon <= MOST_STEPS:
+    mdp, told, horizon, limit = table.mdp, metrics["policies"], *(metrics["table"].get(name) for name in ("horizon", "limit"))
+    if any(steps is not None and not 1 <= steps <= MOST_STEPS for steps in (horizon, limit)):
         return None
     given, known = known_by(config), metrics.get("expert_value") or {}
     uniform = np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
@@ -194,12 +195,12 @@ def again(
     scale = scale_of(read, mdp.gamma, table, half, known.get("episodes") if given["given"] else None)
     good = good_actions(mdp, None if given["episodes_only"] else expert, optimum(mdp, table.reward))
     now = {
-        "policies": judge(read, scale, table, horizon, good, sampled=False),
+        "policies": judge(read, scale, table, horizon, good, limit, sampled=False),
         "score_reason": scale.reason,
         "expert_value": {} if given["given"] else scale_told(scale)["expert_value"],
         "reward": {} if reward is None else judge_reward(reward, table, scale, horizon),
         "training": settled(curve, scale),
-        "table": {key: one for key, one in table_told(table, horizon).items() if key in EVIDENCE},
+        "table": {key: one for key, one in table_told(table, horizon, limit).items() if key in EVIDENCE},
     }
     return claimed, now
 

@@ -1,9 +1,10 @@
 """Others in the places of random generators and of functions, wherever an environment holds them.
 
 A deep copy takes functions as they are: `self.moves = {0: lambda: self.go(0)}` of a copy moves the original. So a function that
-closes over what was copied, or has it as default, is made anew over the copy.
+closes over what was copied, or over a space made of it, or has it as default, is made anew over the copy.
 """
 
+import copy
 import sys
 import types
 from collections import deque
@@ -14,6 +15,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 
 from irl_gym.tables.copies.object_graphs import ATOMS, CODE, GENERATORS, SHARED, Twin, attributes
 
@@ -193,9 +195,12 @@ class _Renewing(_Replacing):
         if id(value) in seen:
             return False
         seen.add(id(value))
-        return any(self._holds_copied(one, seen) for one in held_by(value))
+        parts = value.spaces if isinstance(value, spaces.Tuple) else [*value.values()] if isinstance(value, spaces.Dict) else ()
+        return any(self._holds_copied(one, seen) for one in (*parts, *held_by(value)))
 
     def _swapped(self, value: Any) -> Any:
         if isinstance(value, types.MethodType):
             return types.MethodType(self.value(value.__func__), self._swapped(value.__self__))
+        if isinstance(value, spaces.Dict | spaces.Tuple) and self._holds_copied(value, set()):
+            return copy.deepcopy(value, self.copies)
         return self.value(value) if isinstance(value, types.FunctionType) else self.copies.get(id(value), value)

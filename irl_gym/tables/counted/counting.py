@@ -28,7 +28,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP, check_discount, entry_rows
 from irl_gym.spaces.listed_states import ListedStates
 from irl_gym.tables.copies.calls import called, seeded_globals, stepped
 from irl_gym.tables.copies.stripped import without_watchers
-from irl_gym.tables.copies.time_limits import check_limits, check_times
+from irl_gym.tables.copies.time_limits import check_unread
 from irl_gym.tables.counted.counted_rows import Counts, Entries, seen_entries, supported
 from irl_gym.tables.counted.step_counts import tally
 from irl_gym.tables.tabulation import Evidence, Samples, Tabulation
@@ -188,8 +188,7 @@ class Interaction:
             NotTabular: the environment cannot be copied, or raises an error.
         """
         space: Any = env.action_space
-        check_times(env)
-        check_limits(env)
+        check_unread(env)
         episodes = interact(without_watchers(env), self.steps, seed=self.seed)
         with seeded_globals([self.seed]):
             return self.counting.table(_told(episodes, self.steps, progress), env.observation_space, int(space.n), gamma=gamma)

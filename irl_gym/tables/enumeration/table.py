@@ -20,20 +20,21 @@ import numpy as np
 
 from irl_gym import facts
 from irl_gym.checks import checked_number
-from irl_gym.errors import EnumerationLimit, InvalidParameter, UnknownObservation
+from irl_gym.errors import EnumerationLimit, HiddenState, InvalidParameter, UnknownObservation
 from irl_gym.mdp.tabular_mdp import AS_GOOD_AS_EXACT, TabularMDP
 from irl_gym.spaces.integer_spaces import checked_members, numbers_of_keys, ranges
 from irl_gym.spaces.listed_states import ListedStates, in_order
 from irl_gym.tables.copies.calls import called, seeded_globals
 from irl_gym.tables.copies.snapshots import ConstantChanged
 from irl_gym.tables.copies.stripped import without_watchers
-from irl_gym.tables.copies.time_limits import check_limits, check_times, limited
+from irl_gym.tables.copies.time_limits import Reader, limited, reader_of, with_limits
 from irl_gym.tables.enumeration.deep_walks import walk_on
 from irl_gym.tables.enumeration.explored import Explored, load_explored
 from irl_gym.tables.enumeration.explorer import Explorer
 from irl_gym.tables.enumeration.limits import Limits
 from irl_gym.tables.enumeration.outside import OutsideRandomness
 from irl_gym.tables.enumeration.recheck import check_kept
+from irl_gym.tables.enumeration.told_times import check_times_told
 from irl_gym.tables.tabulation import Evidence, Lines, Samples, Tabulation, from_lines
 from irl_gym.tables.value_error import with_errors
 
@@ -83,14 +84,22 @@ class Enumeration(Limits):
             EnumerationLimit: more states, seconds or bytes than allowed.
             RunConflict: a checkpoint of something else.
         """
-        check_times(env)
-        ranges(env.observation_space)  # refuses floats before anything is copied
-        check_limits(env)
+        reader = reader_of(env)
+        ranges(env.observation_space)  # refuses floats
         with seeded_globals([self.seed]):
-            explored = self._explore(env, progress or (lambda tried, found: None))
-        return _assembled(explored, env, gamma, self)
+            try:
+                explored = self._explore(env, reader, progress or (lambda tried, found: None))
+            except HiddenState as error:
+                if reader is None:
+                    raise
+                raise HiddenState(
+                    f"{error} The wrapper {reader.wrapper} {reader.what}: the time may be what is hidden."
+                ) from error
+        if reader is not None:
+            check_times_told(explored, env.observation_space, reader)
+        return _assembled(explored, env, gamma, self, reader)
 
-    def _explore(self, env: gym.Env, on_states: OnStates) -> Explored:
+    def _explore(self, env: gym.Env, reader: Reader | None, on_states: OnStates) -> Explored:
         """Search; anew with more in the inner state, or with counts, where the search finds that it has to be so."""
         always: frozenset[str] = frozenset()
         outside, modules = "", False
@@ -104,7 +113,7 @@ class Enumeration(Limits):
                 outside, modules = outside or explored.outside, modules or explored.modules
                 always |= frozenset(explored.always)
             try:
-                own = without_watchers(env)
+                own = without_watchers(env) if reader is None else with_limits(env)
                 called(lambda own=own: own.reset(seed=self.seed))
                 explorer = Explorer(own, self, explored, always, bool(outside), modules, on_states)
                 if explorer.continued:
@@ -122,7 +131,7 @@ class Enumeration(Limits):
                 self._forget()
             except UnknownObservation as error:
                 limit, wrappers = limited(env)
-                if not wrappers:
+                if not wrappers or reader is not None:
                     raise
                 names = ", ".join(type(one).__name__ for one in wrappers)
                 raise UnknownObservation(
@@ -182,6 +191,7 @@ class Enumeration(Limits):
             "spec": None if spec is None else json.loads(_ADDRESS.sub("", json.dumps([spec.id, spec.kwargs], default=repr))),
             "observations": str(env.observation_space),
             "actions": str(env.action_space),
+            "limit": None if not limited(env)[1] else limited(env)[0],
             "settings": [self.most_outcomes, self.runs, self.start_runs, self.seed],
         }
 
@@ -192,7 +202,7 @@ def _guard(explorer: Explorer) -> None:
         raise ConstantChanged(names[0])
 
 
-def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -> Tabulation:
+def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits, reader: Reader | None) -> Tabulation:
     """The table of what was found: rows in the order of the observations, ends that are states too as terminal copies."""
     space = env.observation_space
     only_ends = [key for key in explored.ends if key not in explored.ids]
@@ -217,8 +227,9 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -
     d0 = np.zeros(states.n_states)
     for number, probability in explored.starts.items():
         d0[place[number]] += probability
-    evidence = _evidence(explored, len(copies), limits.revisits > 0)
-    made = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=evidence)
+    evidence = _evidence(explored, len(copies), limits.revisits > 0, reader)
+    horizon = None if reader is None else reader.limit
+    made = from_lines(lines, d0 / d0.sum(), A, states, gamma=gamma, evidence=evidence, horizon=horizon)
     if evidence.exact:
         return made
     sampled = np.array(sorted(explored.sampled), dtype=np.int64)
@@ -226,14 +237,14 @@ def _assembled(explored: Explored, env: gym.Env, gamma: float, limits: Limits) -
         visits = np.full(states.n_states * A, AS_GOOD_AS_EXACT)
         visits[place[sampled // A] * A + sampled % A] = limits.runs
         visits = np.where(made.mdp.terminal[:, None], 0, visits.reshape(-1, A))
-        made = replace(made, mdp=TabularMDP(made.mdp.P, gamma, made.mdp.d0, visits))
+        made = replace(made, mdp=TabularMDP(made.mdp.P, gamma, made.mdp.d0, visits, horizon))
     starts = limits.start_runs if explored.starts_counted else math.inf
     paid = min(explored.rewards), max(explored.rewards)
     samples = Samples(made.mdp.P.data, starts, paid)
     return with_errors(replace(made, samples=samples))
 
 
-def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
+def _evidence(explored: Explored, split: int, looked: bool, reader: Reader | None) -> Evidence:
     """How the table was obtained, in words that are the same where the search was interrupted and continued."""
     counted = explored.counted["rows"]
     method = f"Enumeration of {facts.counted(len(explored.keys))} from copies of the environment"
@@ -241,7 +252,7 @@ def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
         method = f"The environment draws from {explored.outside}, which is not its own. {method}"
     if not counted:
         method += f", with every outcome of its draws.{'' if looked else ' Hidden state was not looked for.'}"
-        method += _left_out(explored)
+        method += _left_out(explored, reader)
         return Evidence(method, exact=True, merged=0, split=split, check=None)
     mean_runs = explored.counted["runs"] / counted
     # Hoeffding's inequality, for all counted probabilities at once.
@@ -251,7 +262,7 @@ def _evidence(explored: Explored, split: int, looked: bool) -> Evidence:
         f"sampling leaves probabilities within {error:.3f}, all at once, with 95 % confidence, if observations hide no state."
     )
     method += _looked_for(explored, looked)
-    method += _left_out(explored)
+    method += _left_out(explored, reader)
     return Evidence(method, exact=False, merged=0, split=split, check=None, error=error)
 
 
@@ -269,8 +280,12 @@ def _looked_for(explored: Explored, looked: bool) -> str:
     return told
 
 
-def _left_out(explored: Explored) -> str:
-    """What the environment did that a table cannot hold."""
+def _left_out(explored: Explored, reader: Reader | None) -> str:
+    """What the environment did that a table cannot hold, and that of a time limit which this one holds."""
+    within = ""
+    if reader is not None:
+        steps = facts.counted(reader.limit, "step")
+        within = f" The limit of {steps} is part of it, as {reader.wrapper} reads it: episodes end there."
     if not explored.counted["truncated"]:
-        return ""
-    return " The environment truncated steps itself; truncation is not part of a table."
+        return within
+    return f"{within} The environment truncated steps itself; truncation is not part of a table."

@@ -102,6 +102,21 @@ DICT = Shows(gym.spaces.Dict({"cell": gym.spaces.Discrete(7)}), lambda cell: {"c
 TIMED = TimeAwareObservation(gym.make("FrozenLake-v1", is_slippery=False), flatten=False, normalize_time=False)
 
 
+class Ends(gym.Wrapper):
+    """Turns the limit into an end."""
+
+    def step(self, action):
+        *moved, terminated, truncated, info = self.env.step(action)
+        return *moved, terminated or truncated, False, info
+
+
+ENDS = Ends(TimeLimit(Corridor(), 10))
+
+
+def counted(env):
+    return irl_gym.tabulate(env, gamma=GAMMA, by=Interaction(500), check_steps=0)
+
+
 class Always:
     """Goes down always, whatever is paid."""
 
@@ -168,8 +183,13 @@ CASES = [
     ("Give Told get_state() and set_state(state), or a __deepcopy__ that leaves this attribute out.",
      lambda path: table(Told(locked)), lambda path: table(Set(locked)), lambda path: table(Leaves(locked))),
     ("Leave out what counts on it.", lambda path: table(COUNTED), lambda path: table(COUNTED.env)),
-    ("Leave the wrapper out; or learn from episodes alone, with TrajectoryLP.",
-     lambda path: table(TIMED), lambda path: table(TIMED.env), lambda path: from_episodes(TIMED)),
+    ("Enumerate, with `by=None`; leave the wrapper out; or learn from episodes alone, with TrajectoryLP.",
+     lambda path: counted(TIMED), lambda path: irl_gym.tabulate(TIMED, gamma=GAMMA, by=None),
+     lambda path: counted(TIMED.env), lambda path: from_episodes(TIMED)),
+    ("Make it with `normalize_time=False`.", lambda path: table(TimeAwareObservation(TIMED.env, normalize_time=True)),
+     lambda path: table(TimeAwareObservation(TIMED.env, normalize_time=False))),
+    ("Show it, with `gymnasium.wrappers.TimeAwareObservation(env, flatten=False)`; or leave the wrapper out.",
+     lambda path: table(ENDS, revisits=0), lambda path: table(coded(ENDS, revisits=0)), lambda path: table(ENDS.env)),
 ]  # fmt: skip
 
 

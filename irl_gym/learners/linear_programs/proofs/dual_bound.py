@@ -2,8 +2,9 @@
 
 For *any* y >= 0 on the rows of (4)
     D(y) = sum_s T (1 - sum_a y(s, a))+  +  R_max sum_i (|c_i| - l1)+
-is above every objective, where sum_a is over the rows that count, T bounds a margin (the cap, or 2 R_max / (1 - gamma)) and c
-is the gradient of sum y margins with respect to R. So D(y) - objective bounds what a reward falls short of the optimum.
+is above every objective, where sum_a is over the rows that count, T bounds a margin (the cap, or 2 R_max by the effective
+horizon) and c is the gradient of sum y margins with respect to R. So D(y) - objective bounds what a reward falls short of the
+optimum.
 Axes: S states, A actions, n rows of (4).
 """
 
@@ -15,6 +16,7 @@ import scipy.sparse as sp
 from irl_gym.mdp.optimality_rows import Comparisons
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.time_expanded import Repeated
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,8 @@ class DualBound:
     r_max: float
     l1: float
     cap: float | None
+    tie: Repeated | None = None
+    """Of a reward that is the same in several rows: c is then its gradient."""
 
     def bound(self, y: np.ndarray | None) -> float:
         """The least D(y)."""
@@ -43,7 +47,7 @@ class DualBound:
     def at(self, y: np.ndarray) -> float:
         """D(y), for y >= 0 on the inequalities."""
         mdp, comparisons = self.mdp, self.comparisons
-        most = 2 * self.r_max / (1 - mdp.gamma) if self.cap is None else self.cap
+        most = 2 * self.r_max * mdp.effective_horizon if self.cap is None else self.cap
         states, of_row = np.unique(comparisons.states[self.counted], return_inverse=True)
         per_state = np.bincount(of_row, weights=y[self.counted], minlength=states.size)
         slack = most * float(np.maximum(1 - per_state, 0.0).sum())
@@ -61,6 +65,10 @@ class DualBound:
 
     def gradient(self, y: np.ndarray) -> np.ndarray:
         """c, the gradient of sum y margins with respect to R: (S,) or (S*A,), by one transposed solve."""
+        each = self._of_entries(y)
+        return each if self.tie is None else self.tie.at.T @ each
+
+    def _of_entries(self, y: np.ndarray) -> np.ndarray:
         mdp, comparisons = self.mdp, self.comparisons
         if self.on_states:
             return self.discounted.solve_transposed(comparisons.rows.T @ y)

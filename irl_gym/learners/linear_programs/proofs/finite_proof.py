@@ -22,6 +22,7 @@ from irl_gym.mdp.optimality_rows import Comparisons
 from irl_gym.mdp.planning.discounted import Discounted
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.time_expanded import Repeated
 
 ROUNDING = 1e-12
 """A norm above the least by no more than this is the least."""
@@ -51,7 +52,13 @@ class FiniteProof(Proven):
     """Is R zero everywhere?"""
     unbreakable_rows: np.ndarray
     """(u, 2) state and action of each row of (4) that no reward makes strict while the expert is optimal everywhere, as a
-    program found. Without a cap none asks: empty."""
+    program found; at some time, where there is a horizon. Without a cap none asks: empty."""
+    horizon: int | None = None
+    """H, where sums are of H steps, undiscounted, and the reward is one for all times."""
+    optimal_within: bool | None = None
+    """Is the expert optimal at each time then? None where it is undecided, or there is no horizon."""
+    loss_within: float = 0.0
+    """The best policy earns at most this more than the expert in H steps."""
 
     @property
     def unbreakable(self) -> Indices:
@@ -60,6 +67,8 @@ class FiniteProof(Proven):
 
     def _facts(self) -> Iterator[Fact]:
         yield from super()._facts()
+        if self.horizon is not None:
+            yield self._within
         zero = "not computed" if self.lambda_0 is None else f"{self.lambda_0:.5g}, from which on R is 0"
         yield Fact("lambda, the price of ||R||_1", f"{self.l1:.5g}; lambda_0 {zero}")
         yield cap_told(self.margin_cap)
@@ -75,9 +84,20 @@ class FiniteProof(Proven):
             told = f"{counted(len(self.unbreakable_rows), 'action')} in {counted(self.unbreakable.size)}"
             yield Fact("always tied", f"{told}: no reward of this kind that makes the expert optimal prefers its own", "open")
 
+    @property
+    def _within(self) -> Fact:
+        """Is the expert optimal in H steps, in a sentence."""
+        told = f"undiscounted, the best policy earns at most {self.loss_within:.2g} more than the expert"
+        if self.optimal_within:
+            return Fact(f"within {counted(self.horizon or 0, 'step')}", f"the expert is optimal at each time: {told}", "good")
+        sure = "it is undecided whether" if self.optimal_within is None else "it is not so that"
+        mood = "open" if self.optimal_within is None else "bad"
+        return Fact(f"within {counted(self.horizon or 0, 'step')}", f"{sure} the expert is optimal: {told}", mood)
+
     def to_json(self) -> dict[str, Any]:
-        """As json holds it: NaN and infinity become None."""
-        return plain(self, "duality_gap", "unbreakable")
+        """As json holds it: NaN and infinity become None. Without a horizon nothing is said of one."""
+        without = () if self.horizon is not None else ("horizon", "optimal_within", "loss_within")
+        return {name: one for name, one in plain(self, "duality_gap", "unbreakable").items() if name not in without}
 
 
 def served(mdp: TabularMDP, expert: Any, reward: TabularReward, proof: FiniteProof) -> ActionSets:
@@ -101,6 +121,7 @@ def prove(
     unbreakable_rows: np.ndarray | None = None,
     y: np.ndarray | None = None,
     y_l1: np.ndarray | None = None,
+    tie: Repeated | None = None,
 ) -> FiniteProof:
     """Recompute the LP's objective at a reward, and the bound above every objective.
 
@@ -116,13 +137,15 @@ def prove(
         unbreakable_rows: (u, 2) reported as given; None for none.
         y: (n,) duals of the rows of (4); any values give a valid bound.
         y_l1: (n,) duals of the program that makes ||R||_1 least with all margins at the cap.
+        tie: of a reward that is the same in several rows, whose numbers count once in ||R||_1.
     """
     discounted = Discounted(part.P_pi(comparisons.distribution), part.gamma)
     margins = row_margins(part, comparisons, reward, discounted)
     least = least_per_state(margins[counted], comparisons.states[counted], part.n_states)
     total = float(np.nansum(np.minimum(least, np.inf if margin_cap is None else margin_cap)))
-    norm = float(np.abs(reward.values).sum())
-    dual = DualBound(part, comparisons, discounted, reward.on_states, counted, r_max, l1, margin_cap)
+    numbers = reward.values if tie is None else tie.numbers(reward.values)
+    norm = float(np.abs(numbers).sum())
+    dual = DualBound(part, comparisons, discounted, reward.on_states, counted, r_max, l1, margin_cap, tie)
     return FiniteProof(
         objective=total - l1 * norm,
         dual_bound=dual.bound(y),

@@ -21,6 +21,8 @@ from irl_gym.errors import InvalidDemonstrations, InvalidParameter
 from irl_gym.learners.base import Outcome
 from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
+from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.killable import within
 from irl_gym.spaces.batches import batch_sizes, take
 
 if TYPE_CHECKING:
@@ -51,6 +53,8 @@ class NeuralClone(FitsLabels):
     """What a step counts; balanced: each action as much as any other, of discrete actions."""
     device: str = "cpu"
     """Where the network is: cpu, cuda, or what torch calls others."""
+    time_limit: float | None = None
+    """Seconds for the whole fit, asked for at each minibatch; None for no limit."""
     needs: ClassVar[Needs] = Needs(("demonstrations",))
     """The parts of a problem that `learn` reads."""
     how: ClassVar[str] = "cloned from the episodes, by a network"
@@ -63,6 +67,7 @@ class NeuralClone(FitsLabels):
             checked_number("net_arch", size, "sizes of at least 1", least=1, whole=True)
         if self.learning_rate is not None:
             checked_number("learning_rate", self.learning_rate, "a number above 0, or None", above=0)
+        Deadline.after(self.time_limit)  # checks it
         checked_number("held_out", self.held_out, "a share of at least 0, below 1", least=0, below=1)
         if not is_word(self.weights, "equal", "balanced"):
             raise InvalidParameter(f"weights is {self.weights!r}: expected 'equal' or 'balanced'.")
@@ -103,20 +108,23 @@ class NeuralClone(FitsLabels):
         Raises:
             InvalidDemonstrations: no step, parts of other lengths, or actions outside the space.
             InvalidParameter: balanced weights of actions that are not Discrete.
+            SolverTimeout: the time is up.
         """
         from irl_gym.agents.neural_training import trained
 
+        deadline = Deadline.after(self.time_limit)
         rng = np.random.default_rng(0) if rng is None else rng
         taken = _checked(observations, actions, action_space)
         each = np.array([len(taken)] if lengths is None else lengths)
         if each.sum() != len(taken):
             raise InvalidDemonstrations(f"the lengths add up to {each.sum()}: expected {len(taken)}, the number of steps.")
         model = self._model(observation_space, action_space, rng)
-        return trained(
-            model, observations, taken, self._out(each, rng), self._counts(taken, action_space),
-            rate=self.learning_rate, epochs=self.epochs, batch_size=self.batch_size, patience=self.patience, rng=rng,
-            on_epoch=on_epoch, log=log,
-        )  # fmt: skip
+        with within(deadline):
+            return trained(
+                model, observations, taken, self._out(each, rng), self._counts(taken, action_space),
+                rate=self.learning_rate, epochs=self.epochs, batch_size=self.batch_size, patience=self.patience, rng=rng,
+                on_epoch=on_epoch, log=log,
+            )  # fmt: skip
 
     def _model(self, observations: spaces.Space, actions: spaces.Space, rng: np.random.Generator) -> "PPO":
         """A new network."""

@@ -15,6 +15,7 @@ from irl_gym.agents.neural_proof import Epoch, NeuralProof
 from irl_gym.agents.planners import Agent, torch_threads
 from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Outcome
+from irl_gym.programs.killable import check_limit
 from irl_gym.programs.status import Status
 
 
@@ -79,6 +80,7 @@ def trained(
     adam = torch.optim.Adam(acting, lr=_rate(model) if rate is None else rate)
 
     def loss(which: torch.Tensor) -> torch.Tensor:
+        check_limit()
         log_pi = network.get_distribution(_at(seen, which)).log_prob(targets[which])
         return -(counts[which] * log_pi).sum() / counts[which].sum()
 

@@ -198,7 +198,7 @@ class Arguments:
             learner: Any = self.learning.finite(from_episodes=shown.dataset is not None or shown.epsilon > 0)
         else:
             named = self.learning.learner
-            own = None if named in TAKEN else learner_of(named, parse_keywords(self.learning.options, "options"))
+            own = None if named in TAKEN else learner_of(named, self.learning.own)
             self.learning.check(None if own is None else own.needs)
             env = environment_of(
                 env_id, env_kwargs, shown.dataset, shown.dataset_root, start_seeds=given.start_seeds, reveal=reveal,

@@ -53,7 +53,7 @@ class Learning:
     inner: Annotated[PlannerName | None, UNSET] = None
     """trajectory-lp. Who solves for each reward tried; the default is value-iteration on a table, else ppo."""
     time_limit: Annotated[float | None, UNSET] = None
-    """Seconds for the whole of the learner's work, its proof included; the default is no limit."""
+    """Seconds for all of the learner's work, its proof included (not of clone, which only counts); the default is no limit."""
 
     def check(self, needs: "Needs | None" = None) -> None:
         """Check that no option is given which the learner does not have.
@@ -73,6 +73,21 @@ class Learning:
                     f"--{flag} is {getattr(self, one.name)!r:.60}, but the learner is {self.learner}, which has no such "
                     f"option: expected {expected} with it. Leave it out."
                 )
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The options of a learner that is not one of Ng & Russell's.
+
+        Raises:
+            InvalidParameter: one is given twice, or is no option's value.
+        """
+        from irl_gym.runs.experiment import parse_keywords
+
+        found = parse_keywords(self.options, "options")
+        if self.time_limit is not None and "time_limit" in found:
+            twice = f"time_limit is {self.time_limit:g}, and {found['time_limit']!r:.40} among options"
+            raise InvalidParameter(f"{twice}: expected it once. Leave one out.")
+        return found if self.time_limit is None else {**found, "time_limit": self.time_limit}
 
     def phi(self, env: "gym.Env") -> "FeatureMap":
         """The features that are asked for."""
@@ -117,7 +132,7 @@ OF_PART = {"features": ("features", "size", "coordinates"), "environment": ("inn
 def taken_by_own(needs: "Needs | None") -> tuple[str, ...]:
     """The options of a learner of the user's own: its own, and those of parts that it needs."""
     parts = OF_PART if needs is None else [part for part in OF_PART if part in needs.parts]
-    return ("options", *(option for part in parts for option in OF_PART[part]))
+    return ("options", "time_limit", *(option for part in parts for option in OF_PART[part]))
 
 
 def for_help(learner: str) -> type[Learning]:
@@ -125,7 +140,8 @@ def for_help(learner: str) -> type[Learning]:
     hints, taken, own = get_type_hints(Learning, include_extras=True), TAKEN.get(learner), dict[str, Any]()
     if taken is None:
         kind = _found(learner)
-        taken = taken_by_own(None if kind is None else kind.needs)
+        taken = [one for one in taken_by_own(None if kind is None else kind.needs)
+                 if one != "time_limit" or hasattr(kind, one)]  # fmt: skip
         own = {name: Annotated[hints[name], arg(help=_told(kind))] for name in ("options",)}
     others = [one for one in fields(Learning) if one.name not in ("learner", *taken)]
     made = {one.name: one.default for one in others}

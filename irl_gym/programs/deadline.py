@@ -49,8 +49,8 @@ class Deadline:
         """The error of a fit whose time is up."""
         why = f" ({reasons})" if reasons else ""
         return SolverTimeout(
-            f"no answer in {self.seconds} s, which all programs of a fit have together{why}: raise time_limit, or choose the "
-            "other solver."
+            f"no answer in {self.seconds} s, which all steps of a fit have together{why}: raise time_limit, or choose the "
+            "other solver, of a linear program."
         )
 
 

@@ -116,9 +116,12 @@ _CURRENT: ContextVar[Limited | None] = ContextVar("irl_gym_limit", default=None)
 
 @contextlib.contextmanager
 def within(deadline: Deadline) -> Iterator[None]:
-    """A block in which `called` and `made` hold a limit; in a block of the same limit it is the same child."""
+    """A block in which `called`, `made` and `check_limit` hold a limit.
+
+    In a block of a limit that ends earlier, or of the same, that one stays in force, with its child.
+    """
     current = _CURRENT.get()
-    if deadline is NEVER or (current is not None and current.deadline is deadline):
+    if deadline is NEVER or (current is not None and current.deadline.until <= deadline.until):
         yield
         return
     limited = Limited(deadline)

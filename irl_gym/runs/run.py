@@ -264,7 +264,8 @@ def _computed(
         mend = f"delete {files}, and what they hold is made again"
         raise reader.incomplete(f"its {what} do not bear out its record: {error}; {mend}") from error
     shaped = reader.maybe("reward_shaped.npz", ShapedReward.load)  # earlier versions kept none
-    if shaped is not None and tabular is not None and (fault := misshapen(shaped, tabular, table.mdp)) is not None:
+    cap = certificate["proof"]["terms"].get("margin_cap")
+    if shaped is not None and tabular is not None and (fault := misshapen(shaped, tabular, table.mdp, cap)) is not None:
         raise reader.incomplete(fault)
     if now is not None:
         _check_claims(now[0], metrics, reader)

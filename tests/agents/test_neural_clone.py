@@ -1,6 +1,7 @@
 """Behaviour cloning by a network: of every kind of space, stopped in time, and gone on from by PPO."""
 
 import json
+from itertools import count
 
 import gymnasium as gym
 import numpy as np
@@ -10,9 +11,10 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 
 from irl_gym.agents.neural_clone import NeuralClone
-from irl_gym.errors import InvalidDemonstrations, InvalidParameter
+from irl_gym.errors import InvalidDemonstrations, InvalidParameter, SolverTimeout
 from irl_gym.learners.problem import Problem, Spaces
 from irl_gym.mdp.episodes import Episode
+from irl_gym.programs import deadline
 from irl_gym.spaces.states import StateIndex
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (1_500, 2)).astype(np.float32)
@@ -107,9 +109,19 @@ def test_rows_of_the_table_are_shown_where_observations_have_parts():
     assert found.policy.predict(states.decode_batch(np.arange(4)), deterministic=True)[0].tolist() == [0, 1, 0, 1]
 
 
+def test_a_limit_of_time_ends_the_training(monkeypatch):
+    monkeypatch.setattr(deadline.time, "monotonic", map(float, count()).__next__)  # a second passes whenever it is asked
+    epochs = []
+    with pytest.raises(SolverTimeout, match=r"no answer in 60\.0 s"):
+        slow = NeuralClone(net_arch=(4,), epochs=10_000, patience=10_000, time_limit=60.0)
+        slow.fit(POINTS, SIDES, PLANE, spaces.Discrete(2), on_epoch=lambda *told: epochs.append(told))
+    assert 0 < len(epochs) <= 60 / (1_350 // 128)
+
+
 @pytest.mark.parametrize(
     ("made", "error", "told"),
     [
+        (lambda: NeuralClone(time_limit=0.0), InvalidParameter, "time_limit is 0.0: expected seconds above 0, or None"),
         (lambda: NeuralClone(epochs=0), InvalidParameter, "epochs is 0: expected a whole number of at least 1"),
         (lambda: NeuralClone(net_arch=(0,)), InvalidParameter, "net_arch is 0: expected sizes of at least 1"),
         (lambda: NeuralClone(held_out=1.0), InvalidParameter, "held_out is 1.0: expected a share of at least 0, below 1"),

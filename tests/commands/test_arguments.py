@@ -84,6 +84,9 @@ def test_an_argument_reaches_the_experiment(arguments, field, expected):
     assert getattr(asked(**arguments), field) == expected
 
 
+LIMITED = ("finite-lp", "feature-lp", "trajectory-lp", "softmax-clone", "neural-clone", "dagger")
+
+
 @pytest.mark.parametrize(
     ("arguments", "field", "expected"),
     [
@@ -111,11 +114,22 @@ def test_an_argument_reaches_the_experiment(arguments, field, expected):
         ({"learner": "trajectory-lp"}, "max_rounds", 30),
         ({"learner": "trajectory-lp", "env_id": "CartPole-v1"}, "max_rounds", 8),
         ({"learner": "trajectory-lp", "bins": (9,), **CAR}, "max_rounds", 30),
-        *[({"learner": one, "time_limit": 9.0}, "time_limit", 9.0) for one in ("finite-lp", "feature-lp", "trajectory-lp")],
+        *[({"learner": one, "time_limit": 9.0}, "time_limit", 9.0) for one in LIMITED],
     ],
 )
 def test_an_argument_reaches_the_learner(arguments, field, expected):
     assert getattr(learner(**arguments), field) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "told"),
+    [("clone", (), "unexpected keyword argument 'time_limit'"),
+     ("dagger", ("time_limit=3",), r"time_limit is 9, and 3 among options: expected it once\. Leave one out\.")],
+)  # fmt: skip
+def test_a_time_limit_is_given_once_and_to_who_has_one(name, options, told):
+    with pytest.raises(InvalidParameter, match=told):
+        learner(learner=name, time_limit=9.0, options=options)
+    assert getattr(learner(learner=name, options=options), "time_limit", None) == (3 if options else None)
 
 
 @pytest.mark.parametrize(

@@ -228,7 +228,7 @@ CASES = [
      lambda: softmax(l2=1e-3, max_iterations=3),
      lambda: softmax(l2=10.0, max_iterations=3) and softmax(l2=1e-3, max_iterations=300)),
     # time
-    ("raise time_limit, or choose the other solver.", lambda: hurried(1e-9), lambda: hurried(60.0)),
+    ("raise time_limit, or choose the other solver, of a linear program.", lambda: hurried(1e-9), lambda: hurried(60.0)),
     ("raise time_limit, or give most_pieces.", lambda: path(time_limit=1e-9), lambda: path(time_limit=60.0, most_pieces=2)),
     ("Is there enough memory? Without time_limit the first solver works in this process, and is not ended.",
      lambda: in_child(60.0, 3), lambda: in_child(None, None)),

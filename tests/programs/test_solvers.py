@@ -122,7 +122,7 @@ def test_programs_of_a_fit_share_its_time(learner, clock):
     needed = clock[0] - start
     assert needed >= 2
     learner(time_limit=needed + 0.5).fit(model.mdp, model.expert)
-    with pytest.raises(SolverTimeout, match="which all programs of a fit have together"):
+    with pytest.raises(SolverTimeout, match="which all steps of a fit have together"):
         learner(time_limit=needed - 0.5).fit(model.mdp, model.expert)
 
 

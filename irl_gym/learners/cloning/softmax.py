@@ -25,6 +25,8 @@ from irl_gym.learners.needs import Needs
 from irl_gym.learners.problem import Problem
 from irl_gym.mdp.episodes import EmpiricalPolicy
 from irl_gym.mdp.tabular_mdp import TransitionTable
+from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.killable import check_limit, within
 from irl_gym.programs.status import Status
 from irl_gym.spaces.states import StateIndex, States
 
@@ -47,6 +49,8 @@ class SoftmaxClone:
     """Price of half the sum of the squared weights, above 0: what keeps the weights of an expert that never errs finite."""
     max_iterations: int = 20_000
     """Of L-BFGS."""
+    time_limit: float | None = None
+    """Seconds for the whole fit, asked for at each iteration; None for no limit. A caller's features are not cut."""
     needs: ClassVar[Needs] = Needs(("demonstrations",), ("dynamics", "features"), "inferred")
     """The parts of a problem that `learn` reads; the dynamics tell which states matter."""
     how: ClassVar[str] = "cloned from the episodes, by a softmax of features"
@@ -59,6 +63,7 @@ class SoftmaxClone:
             object.__setattr__(self, "features", as_features(self.features))
         checked_number("l2", self.l2, "a number above 0", above=0)
         checked_number("max_iterations", self.max_iterations, "a whole number of at least 1", least=1, whole=True)
+        Deadline.after(self.time_limit)  # checks it
 
     def learn(self, problem: Problem, rng: np.random.Generator | None = None) -> Outcome[None, SoftmaxProof]:
         """The same as `fit`, of a problem; nothing is drawn.
@@ -91,7 +96,14 @@ class SoftmaxClone:
             InvalidDemonstrations: counts that no episodes could have given, or of another table.
             InvalidFeatures: what the features give is not (S, K) finite numbers.
             SolverFailed: f may be more than 1e-6 above its least.
+            SolverTimeout: the time is up.
         """
+        with within(Deadline.after(self.time_limit)):
+            return self._fitted(seen, table, states)
+
+    def _fitted(
+        self, seen: EmpiricalPolicy | np.ndarray, table: TransitionTable | None, states: States | None
+    ) -> Outcome[None, SoftmaxProof]:
         counts, phi = weights_of(seen, table), as_features(self.features)
         decode: Callable[[np.ndarray], Any] = (lambda rows: rows) if states is None else states.decode_batch
         if states is None:
@@ -134,6 +146,7 @@ class SoftmaxClone:
         shape, here = (X.shape[1], n.shape[1]), n.sum(axis=1, keepdims=True)
 
         def f(flat: np.ndarray) -> tuple[float, np.ndarray]:
+            check_limit()
             theta = flat.reshape(shape)
             log_pi = log_softmax(X @ theta, axis=1)
             gradient = X.T @ (here * np.exp(log_pi) - n) + self.l2 * theta

@@ -40,6 +40,8 @@ from irl_gym.learners.problem import Problem
 from irl_gym.learners.registry import learner_of
 from irl_gym.mdp.planning.dynamic_programming import occupancy
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs.deadline import Deadline
+from irl_gym.programs.killable import within
 from irl_gym.programs.status import Status
 from irl_gym.records import Record
 from irl_gym.spaces.states import StateIndex, States
@@ -107,6 +109,9 @@ class DAgger:
     """Ask at each visit, or only in states in which the oracle has not answered yet; its answer then serves at each visit."""
     cost: Costs = "mistakes"
     """What is minimised: mistakes; or what they cost, by the advantages of an oracle that is a table, under the true reward."""
+    time_limit: float | None = None
+    """Seconds for all rounds together, asked for at each query, step and iteration; None for no limit. What the oracle does
+    with a query is not cut."""
     needs: ClassVar[Needs] = Needs(("oracle", "dynamics or environment"), ("reward", "features"))
     """The parts of a problem that `learn` reads; the reward tells which round is the best, and what mistakes cost."""
     resumes: ClassVar[bool] = True
@@ -123,6 +128,7 @@ class DAgger:
         for name, known in words.items():
             if not is_word(getattr(self, name), *get_args(known)):
                 raise InvalidParameter(f"{name} is {getattr(self, name)!r:.60}: expected one of {', '.join(get_args(known))}.")
+        Deadline.after(self.time_limit)  # checks it
         if isinstance(self.learner, str):
             object.__setattr__(self, "learner", learner_of(self.learner, {}))
         check_clones(self.learner, priced=self.cost == "advantage", sampled=self.episodes is not None)
@@ -167,6 +173,7 @@ class DAgger:
             InvalidParameter: no table and no number of episodes; no gate, or no prices, where these are asked for.
             InvalidPolicy: the oracle's answer is no action.
             RunConflict: the folder holds answers to other questions.
+            SolverTimeout: the time is up.
         """
         played = [*self.iterate(problem, rng, folder, stage)]
         by, merits = "last", np.arange(len(played), dtype=float)
@@ -190,6 +197,7 @@ class DAgger:
         self, problem: Problem, rng: np.random.Generator, folder: Path | None = None, stage: gym.Env | None = None
     ) -> Iterator[Round]:
         """A round at a time; arguments and errors as `learn`."""
+        deadline = Deadline.after(self.time_limit)
         known: Any = self.needs.of(problem, self)
         A = int(discrete_actions(known.spaces.actions).n)
         mdp = known.dynamics if isinstance(known.dynamics, TabularMDP) else None
@@ -207,12 +215,13 @@ class DAgger:
         try:
             for number in range(1, self.rounds + 1):
                 beta = self.share(number)
-                acting = chance if self.labels == "clean" else policy
-                visits = self._visits(known, mdp, env, clones, acting, beta, labels, rng, number)
-                mistakes = clones.mistakes(policy, visits)
-                policy = clones.learned(visits, rng)
-                matrix = None if mdp is None else clones.matrix(policy)
-                judged = (None, None, None) if matrix is None else _judged(mdp, matrix, known.reward, labels.shares)
+                with within(deadline):
+                    acting = chance if self.labels == "clean" else policy
+                    visits = self._visits(known, mdp, env, clones, acting, beta, labels, rng, number)
+                    mistakes = clones.mistakes(policy, visits)
+                    policy = clones.learned(visits, rng)
+                    matrix = None if mdp is None else clones.matrix(policy)
+                    judged = (None, None, None) if matrix is None else _judged(mdp, matrix, known.reward, labels.shares)
                 yield Round(beta, visits, policy, labels.queries, mistakes, *judged, labels.contradicted, labels.labelled)
                 if judged[1] == 0 and self.ask == "unseen":
                     return

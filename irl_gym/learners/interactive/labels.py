@@ -10,6 +10,7 @@ import numpy as np
 
 from irl_gym._typing import Matrix
 from irl_gym.learners.interactive.labelled import UNLABELLED
+from irl_gym.programs.killable import check_limit
 from irl_gym.spaces.states import States
 
 Asking = Literal["always", "unseen"]
@@ -112,9 +113,11 @@ class Labels:
 
         Raises:
             InvalidPolicy: the oracle's answer is no action.
+            SolverTimeout: the time of a limit in force is up.
         """
         if row is not None and self._ask == "unseen" and self.counts[row].any():
             return int(self.counts[row].argmax()), False
+        check_limit()
         label = self._oracle.ask(self._seen(row, observation), info, n_actions=self._n_actions)
         if row is not None:
             self.counts[row, label] += 1

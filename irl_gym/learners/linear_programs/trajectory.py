@@ -148,7 +148,8 @@ class TrajectoryLP(Record):
         expert = usable(episodes, asked, getattr(world, "limit", None))
         horizon, r_unit = expert.horizon, self._largest(expert.episodes)
         theirs = Estimate.of(discounted_sums(expert.episodes, self.phi, world.gamma, horizon=horizon))
-        found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
+        with within(solving.deadline):
+            found = [Estimate.of(world.sums(None, self.phi, self.trajectories, horizon=horizon, seed=self.seed))]
         for number in range(1, self.max_rounds + 1):
             rows = Rows(theirs.mean - np.array([one.mean for one in found]), np.arange(len(found)))
             program = {"slope": float(self.penalty), "l1": float(self.l1), "cap": self._cap(rows, solving)}

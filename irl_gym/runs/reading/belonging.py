@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from irl_gym.errors import InvalidInput
 from irl_gym.judging.scores import CLONE, LEARNED, RETRAINED
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.shaping import ExpectedAdvantage, ShapedReward
+from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.tables.layouts import GridLayout
 
@@ -120,16 +121,28 @@ def left_open(
         yield f"ambiguity.npz has breakpoints that do not increase from 0; {MADE_AGAIN}"
 
 
-def misshapen(shaped: ShapedReward, learned: TabularReward, mdp: TabularMDP) -> str | None:
-    """What is wrong with reward_shaped.npz, likewise; None where it is the shaping of the learned reward on this table."""
+def misshapen(shaped: ShapedReward, learned: TabularReward, mdp: TabularMDP, margin_cap: float | None) -> str | None:
+    """What is wrong with reward_shaped.npz, likewise; None where it is the shaping of the learned reward on this table.
+
+    Args:
+        shaped: what the file holds.
+        learned: the reward, in the table.
+        mdp: the table.
+        margin_cap: of the learner's program, up to which losses count; None or 0 for a typical loss.
+    """
     known = shaped.learned.values
     if known.shape != learned.values.shape or not _alike(known, learned.values):
         return f"reward_shaped.npz is of another reward than reward.npz; {MADE_AGAIN}"
-    now = ExpectedAdvantage(shaped.clip).apply(learned, mdp).values
-    if now.shape != shaped.values.shape or not _alike(shaped.values, now):
+    try:
+        now = ShapedReward.of(learned, mdp, margin_cap or None)
+    except InvalidInput as error:
+        return f"certificate.json has the margin_cap {margin_cap}, and no reward can be clipped there ({error}); {MADE_AGAIN}"
+    if (shaped.clip is None) is not (now.clip is None) or not _alike(np.float64(shaped.clip or 0), np.float64(now.clip or 0)):
+        return f"reward_shaped.npz counts losses up to {shaped.clip}: expected {now.clip}, as the run has it; {MADE_AGAIN}"
+    if now.values.shape != shaped.values.shape or not _alike(shaped.values, now.values):
         return f"reward_shaped.npz has not what reward.npz and table.npz give, the expected advantage; {MADE_AGAIN}"
     return None
 
 
-def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+def _alike(one: Any, other: Any) -> bool:
     return bool(np.abs(one - other).max(initial=0.0) <= WITHIN * np.abs(other).max(initial=0.0))

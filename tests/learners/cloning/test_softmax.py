@@ -1,12 +1,15 @@
 """Behaviour cloning by a softmax of features, against the same convex program in cvxpy."""
 
+from itertools import count
+
 import cvxpy as cp
 import numpy as np
 import pytest
 
-from irl_gym.errors import InvalidFeatures, InvalidParameter, SolverFailed
+from irl_gym.errors import InvalidFeatures, InvalidParameter, SolverFailed, SolverTimeout
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.cloning.softmax import SoftmaxClone
+from irl_gym.programs import deadline
 from irl_gym.programs.status import Status
 
 
@@ -50,9 +53,17 @@ def test_a_proof_is_no_better_than_the_gradient_says():
     assert proof.suboptimality == proof.gradient_norm**2 / 0.2 and proof.to_json()["suboptimality"] == proof.suboptimality
 
 
+def test_a_limit_of_time_ends_the_iterations(monkeypatch):
+    monkeypatch.setattr(deadline.time, "monotonic", map(float, count()).__next__)  # a second passes whenever it is asked
+    with pytest.raises(SolverTimeout, match=r"no answer in 3\.0 s"):
+        SoftmaxClone(np.eye(2), time_limit=3.0).fit(np.array([[3, 1], [1, 9]]))
+    assert SoftmaxClone(np.eye(2), time_limit=1e4).fit(np.array([[3, 1], [1, 9]])).proof.suboptimality < 1e-6
+
+
 @pytest.mark.parametrize(
     ("made", "error", "told"),
     [
+        (lambda: SoftmaxClone(time_limit=-1.0), InvalidParameter, "time_limit is -1.0: expected seconds above 0, or None"),
         (lambda: SoftmaxClone(l2=0.0), InvalidParameter, "l2 is 0.0: expected a number above 0"),
         (lambda: SoftmaxClone(max_iterations=0), InvalidParameter, "max_iterations is 0: expected"),
         (lambda: SoftmaxClone(np.eye(3)).fit(np.ones((2, 2))), InvalidFeatures, "the features are of 3 states: expected 2"),

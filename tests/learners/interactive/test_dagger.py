@@ -1,6 +1,7 @@
 """DAgger, against what it is by definition."""
 
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import gymnasium as gym
@@ -14,7 +15,7 @@ from stable_baselines3 import PPO
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.agents.simulator import Simulator
 from irl_gym.environments.generative import GenerativeModel
-from irl_gym.errors import InvalidParameter, InvalidPolicy
+from irl_gym.errors import InvalidParameter, InvalidPolicy, SolverTimeout
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.cloning.softmax import SoftmaxClone
 from irl_gym.learners.interactive.dagger import DAgger
@@ -22,6 +23,7 @@ from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.mdp.planning.dynamic_programming import backup, occupancy, policy_evaluation
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.programs import deadline
 
 COARSE = Clone(cells=[0, 0, 0, 1, 1, 2, 2])
 """A class that does not tell all of 7 states apart."""
@@ -230,6 +232,24 @@ def test_a_world_that_cannot_be_stepped_is_refused(lake):
         DAgger(episodes=1).learn(in_an_environment(lake, Oracle(right_or_down), environment=Dream()), rng())
 
 
+# --- time ---
+
+
+@pytest.mark.parametrize(
+    ("options", "in_table"),
+    [({}, True), ({"episodes": 3}, True), ({"ask": "unseen", "episodes": 9}, True), ({"episodes": 3}, False),
+     ({"learner": SoftmaxClone(np.eye(7))}, True)],
+)  # fmt: skip
+def test_a_limit_of_time_is_of_all_rounds_together(lake, monkeypatch, options, in_table):
+    model, asked = random_model(0, S=7, A=3), []
+    answers = Oracle(lambda row, info: asked.append(row) or (int(model.expert[row]) if in_table else right_or_down(row, info)))
+    known = Problem.of(model.mdp, oracle=answers) if in_table else in_an_environment(lake, answers)
+    monkeypatch.setattr(deadline.time, "monotonic", map(float, count()).__next__)  # a second passes whenever it is asked
+    with pytest.raises(SolverTimeout, match=r"no answer in 40\.0 s"):
+        [*DAgger(rounds=10_000, time_limit=40.0, **options).iterate(known, rng())]
+    assert 0 < len(asked) <= 40
+
+
 # --- refusals ---
 
 
@@ -244,6 +264,7 @@ def test_a_world_that_cannot_be_stepped_is_refused(lake):
         ({"noise": 1.0}, "noise is 1.0"),
         ({"labels": "all"}, "labels is 'all': expected one of own, clean, gated"),
         ({"ask": "never"}, "ask is 'never': expected one of always, unseen"),
+        ({"time_limit": 0}, "time_limit is 0: expected seconds above 0, or None"),
         ({"learner": DAgger()}, "expected one that clones labels"),
         ({"learner": "finite-lp"}, "expected one that clones labels"),
         ({"learner": "neural-clone"}, "episodes is None and the learner a NeuralClone"),

@@ -128,7 +128,7 @@ def test_trajectory_lp_cuts_trajectories_after_the_horizon(asked, expected):
 def test_trajectory_lp_shares_its_time_among_all_rounds(monkeypatch):
     world, results = Chain(), []
     monkeypatch.setattr(deadline.time, "monotonic", map(float, count()).__next__)  # a second passes whenever it is asked
-    with pytest.raises(SolverTimeout, match="which all programs of a fit have together"):
+    with pytest.raises(SolverTimeout, match="which all steps of a fit have together"):
         for result in TrajectoryLP(OneHot(8), trajectories=50, horizon=50, time_limit=1000.0).iterate(world, world.expert(20)):
             results.append(result)
     assert 0 < len(results) < 30

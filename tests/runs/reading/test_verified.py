@@ -15,7 +15,7 @@ from irl_gym.files.run_folder import read_json, write_json
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.mdp.policies import load_actions
 from irl_gym.mdp.rewards import TabularReward
-from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.mdp.shaping import ExpectedAdvantage, ShapedReward
 from irl_gym.runs.certificates import claims_in, facts_in
 from irl_gym.runs.diagnosed import diagnose_run
 from irl_gym.runs.reading.belonging import at_odds
@@ -53,21 +53,34 @@ def test_a_run_whose_files_do_not_bear_out_its_record_is_refused(unvouched, swap
         read_run(unvouched)
 
 
-def reshaped(path, reward=lambda one: one, paid=lambda one: one):
+def reshaped(path, reward=lambda one: one, paid=lambda one: one, clip=lambda one: one.clip):
     one = ShapedReward.load(path / "reward_shaped.npz")
     changed = (TabularReward(change(kind.values), kind.note) for kind, change in ((one.paid, paid), (one.learned, reward)))
-    ShapedReward(*changed, one.clip).save(path / "reward_shaped.npz")
+    ShapedReward(*changed, clip(one)).save(path / "reward_shaped.npz")
 
 
 @pytest.mark.parametrize(
     ("change", "found"),
     [({"reward": lambda R: R + 1}, "of another reward than reward.npz"), ({"paid": np.negative}, "the expected advantage"),
-     ({"reward": lambda R: R[:-1], "paid": lambda R: R[:-1]}, "of another reward than reward.npz")],
+     ({"reward": lambda R: R[:-1], "paid": lambda R: R[:-1]}, "of another reward than reward.npz"),
+     ({"clip": lambda one: one.clip * 2}, r"counts losses up to \S+: expected \S+, as the run has it")],
 )  # fmt: skip
 def test_a_shaped_reward_that_is_not_that_of_the_run_is_refused(unvouched, change, found):
     reshaped(unvouched, **change)
     with pytest.raises(RunIncomplete, match=found):
         read_run(unvouched)
+
+
+@pytest.mark.parametrize("tau", [10.0, None])
+def test_a_shaped_reward_whose_clip_is_not_the_runs_is_refused_though_it_is_an_expected_advantage(unvouched, run, tau):
+    path = unvouched / "reward_shaped.npz"
+    clip = None if tau is None else tau * ShapedReward.load(path).clip
+    ShapedReward(ExpectedAdvantage(clip).apply(run.tabular, run.table.mdp), run.tabular, clip).save(path)
+    with pytest.raises(RunIncomplete, match="counts losses up to"):
+        read_run(unvouched)
+    path.unlink()  # as the error says
+    recover_and_retrain(asked(), unvouched)
+    assert read_run(unvouched).recomputed
 
 
 def test_a_run_of_an_earlier_version_has_no_shaped_reward(unvouched):

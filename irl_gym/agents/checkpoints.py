@@ -12,15 +12,18 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import DictReplayBuffer, ReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 
+from irl_gym.agents.checkpoint_checks import copies_stand, count, counter, moments_of, numbers, old_generator, same_shapes
 from irl_gym.environments.tabular_vec_env import TabularVecEnv
 from irl_gym.errors import DamagedFile, RunConflict
 from irl_gym.files.archives import json_in, read_arrays
@@ -32,8 +35,8 @@ MOST_REPLAYED = 1 << 28
 """Bytes of a replay buffer that are kept: the newest steps of a larger one, and then what goes on is not the same."""
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls", "exploration_rate", "_current_progress_remaining")
 """Numbers of SB3's algorithms; each has some of them."""
-OBSERVED = ("_last_obs", "_last_original_obs", "_last_episode_starts")
-"""Where an algorithm stands in its environment."""
+_SURPRISES = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, ArithmeticError)
+"""What is raised of a state that is none."""
 WHO = ("irl_gym", "stable_baselines3", "torch", "numpy")
 """Packages of another version of which a checkpoint is not gone on with."""
 
@@ -100,22 +103,14 @@ class Checkpoint:
             told = json_in(found, "told")
             if told["of"] != self._identity:
                 return None
+            report_at, before = count("report_at", told["report_at"]), [count("resumed", one) for one in told["resumed"]]
             exact = _restore(model, found, told)
             if self.seen is not None:
                 self.seen.take(_below("seen", found))
             self.went_on = model.num_timesteps
-            self.resumed = [*told["resumed"], *([] if exact else [model.num_timesteps])]
-            return int(told["report_at"])
-        except (
-            OSError,
-            DamagedFile,
-            LookupError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            RuntimeError,
-            ArithmeticError,
-        ) as error:
+            self.resumed = [*before, *([] if exact else [model.num_timesteps])]
+            return report_at
+        except _SURPRISES as error:
             why = " ".join(str(error).split())[:200]
             raise RunConflict(
                 f"{self.path} cannot be read ({type(error).__name__}: {why}): expected the training that was under way. "
@@ -202,41 +197,40 @@ def _state(model: Any) -> dict[str, Any]:
     world = model.get_env().unwrapped
     if isinstance(world, TabularVecEnv):
         state["world"] = world.moment()
-        state["observed"] = {name: getattr(model, name) for name in OBSERVED}
     return state
 
 
 def _restore(model: Any, found: Mapping[str, np.ndarray], told: Mapping[str, Any]) -> bool:
     """Set a model to a state; is all there that its training depends on?"""
-    weights = model.get_parameters()
+    weights, N = model.get_parameters(), model.n_envs
     for name, one in weights.items():
         kept = _below(f"model/weights/{name}", found)
-        weights[name] = {**one, "state": _of_optimizer(kept)} if "optimizer" in name else _tensors(kept)
+        if "optimizer" in name:
+            weights[name] = {**one, "state": _of_optimizer(kept, moments_of(attrgetter(name)(model)))}
+        else:
+            same_shapes(name, kept, one)
+            weights[name] = _tensors(kept)
     model.set_parameters(weights)
     for name in filter(lambda one: hasattr(model, one), COUNTERS):  # nothing else that a file names
-        if not isinstance(told["counters"][name], int | float):
-            raise TypeError(f"{name} is no number")
-        setattr(model, name, told["counters"][name])
-    episodes = [{"r": r, "l": int(n), "t": t} for r, n, t in found["model/episodes"].tolist()]
-    model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
+        setattr(model, name, counter(name, told["counters"][name], getattr(model, name)))
+    episodes = numbers(found, "model/episodes", (None, 3)).tolist()
+    model.ep_info_buffer = deque(({"r": r, "l": int(n), "t": t} for r, n, t in episodes), maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     exact = _refill(getattr(model, "replay_buffer", None), found, told)
     scale, world = model.get_vec_normalize_env(), model.get_env().unwrapped
     if scale is not None:
-        kept = _below("model/scale", found)
-        scale.ret_rms.mean, scale.ret_rms.var, scale.ret_rms.count = kept["mean"], kept["var"], float(kept["count"])
-        scale.returns = kept["returns"]
+        kept, rms = _below("model/scale", found), scale.ret_rms
+        rms.mean, rms.var = numbers(kept, "mean", ()), numbers(kept, "var", (), least=0.0)
+        rms.count, scale.returns = float(numbers(kept, "count", (), least=0.0)), numbers(kept, "returns", (N,))
     if isinstance(world, TabularVecEnv):
-        world.go_on(_below("model/world", found))
-        for name in OBSERVED:
-            parts = _below(f"model/observed/{name}", found)
-            setattr(model, name, found.get(f"model/observed/{name}", parts or None))
+        moment = copies_stand(_below("model/world", found), N, world.table.n_states)
+        model._last_obs, model._last_episode_starts = world.go_on(moment)
+        model._last_original_obs = None if scale is None else model._last_obs  # only what is paid is divided
     else:
         exact = False
         world.seed(int(model.seed or 0) + model.num_timesteps)  # takes effect at the reset that `learn` begins with
     torch.set_rng_state(torch.tensor(told["torch"], dtype=torch.uint8))
-    kind, keys, *rest = told["numpy"]
-    np.random.set_state((kind, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002 (SB3 draws from it)
+    np.random.set_state(old_generator(told["numpy"]))  # noqa: NPY002 (SB3 draws from it)
     model.action_space.np_random.bit_generator.state = told["actions"]
     return exact
 
@@ -245,13 +239,15 @@ def _tensors(kept: Mapping[str, np.ndarray]) -> dict[str, torch.Tensor]:
     return {name: torch.as_tensor(one) for name, one in kept.items()}
 
 
-def _of_optimizer(kept: Mapping[str, np.ndarray]) -> dict[int, dict[str, torch.Tensor]]:
-    """The state of an optimiser: by the number of a parameter, what is noted of it."""
-    state: dict[int, dict[str, torch.Tensor]] = {}
-    for name, one in _tensors(kept).items():
+def _of_optimizer(kept: Mapping[str, np.ndarray], now: Mapping[int, Mapping[str, Any]]) -> dict[int, dict[str, torch.Tensor]]:
+    """The state of an optimiser: by the number of a parameter, what is noted of it, as it is now after a step."""
+    state: dict[int, dict[str, np.ndarray]] = {}
+    for name, one in kept.items():
         number, _, what = name.partition("/")
         state.setdefault(int(number), {})[what] = one
-    return state
+    for number, one in state.items():
+        same_shapes(f"moments of parameter {number}", one, now[number])
+    return {number: _tensors(one) for number, one in state.items()}
 
 
 def _generators(model: Any) -> dict[str, Any]:
@@ -286,7 +282,17 @@ def _refill(buffer: ReplayBuffer | None, found: Mapping[str, np.ndarray], told: 
     """Fill a replay buffer; does it hold all that it held?"""
     if buffer is None:
         return True
+    (place, full), whole = told["replay"], told["whole"]
+    if count("replay", place) >= buffer.buffer_size or type(full) is not bool or type(whole) is not bool:
+        raise DamagedFile(f"its replay is {told['replay']!r:.60}, of a buffer for {buffer.buffer_size}")
+    filled = buffer.buffer_size if full else place
     for name, one in _rows(buffer).items():
-        one[: len(found[name])] = found[name]
-    buffer.pos, buffer.full = told["replay"]
-    return told["whole"]
+        kept = numbers(found, name, (filled, *one.shape[1:]), one.dtype.kind)
+        _, what, *part = name.split("/")  # replay/next_observations/key
+        space: Any = {"observations": buffer.observation_space, "actions": buffer.action_space}.get(what.removeprefix("next_"))
+        space = space[part[0]] if part and isinstance(space, spaces.Dict) else space
+        if isinstance(space, spaces.Discrete):
+            numbers(found, name, kept.shape, one.dtype.kind, 0, int(space.n) - 1)
+        one[:filled] = kept
+    buffer.pos, buffer.full = place, full
+    return whole

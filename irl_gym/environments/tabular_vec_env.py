@@ -107,10 +107,21 @@ class TabularVecEnv(VecEnv):
         drawn = np.array(json.dumps(self._rng.bit_generator.state))
         return {"rows": self._rows, "elapsed": self._elapsed, "returns": self._returns, "generator": drawn}
 
-    def go_on(self, moment: Mapping[str, np.ndarray]) -> None:
-        """Set all copies to a `moment` of theirs."""
-        self._rows, self._elapsed, self._returns = (moment[name].copy() for name in ("rows", "elapsed", "returns"))
+    def go_on(self, moment: Mapping[str, np.ndarray]) -> tuple[Any, np.ndarray]:
+        """Set all copies to a `moment` of theirs; what they show, and (N,) whether their episodes have just begun.
+
+        Raises:
+            InvalidInput: a copy stands in a terminal state, or longer than episodes last.
+        """
+        rows, elapsed, returns = (moment[name].copy() for name in ("rows", "elapsed", "returns"))
+        if self.table.terminal[rows].any() or elapsed.max() >= self._limit:
+            raise InvalidInput(
+                f"copies stand in {rows[:9]} after {elapsed[:9]} steps: expected states that act, and at most "
+                f"{self._limit - 1:,} steps. Give what `moment` gave."
+            )
         self._rng.bit_generator.state = json.loads(str(moment["generator"]))
+        self._rows, self._elapsed, self._returns = rows, elapsed, returns
+        return self._observe(rows), elapsed == 0
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions (N,) of the next step.

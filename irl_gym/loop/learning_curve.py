@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from irl_gym.agents.checkpoint_checks import LARGEST, MOST, numbers
+from irl_gym.errors import DamagedFile
 from irl_gym.judging.curves import Curve, curve_of
 from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.policies import Policy
@@ -64,11 +66,24 @@ class Glances:
                 "updates": updates}  # fmt: skip
 
     def take(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from the points of a checkpoint."""
-        if arrays:
-            self._steps, self._values = arrays["steps"].tolist(), arrays["values"].tolist()
-            self._glanced = list(arrays["glanced"])
-            self._updates = int(arrays["updates"]) if arrays["updates"] >= 0 else None
+        """Go on from the points of a checkpoint.
+
+        Raises:
+            DamagedFile: they are none of this world.
+        """
+        if not arrays:
+            return
+        steps, values = (numbers(arrays, name, (None,), kind, 0 if kind == "iu" else -LARGEST, LARGEST)
+                         for name, kind in (("steps", "iu"), ("values", "f")))  # fmt: skip
+        mdp, updates = self.world.mdp, int(numbers(arrays, "updates", (), "iu", -1, MOST))
+        if mdp is None:
+            glanced = numbers(arrays, "glanced", (len(steps), None))
+        else:
+            glanced = numbers(arrays, "glanced", (len(steps), mdp.n_states), "iu", 0, mdp.n_actions - 1)
+        if len(values) != len(steps):
+            raise DamagedFile(f"its values are {len(values)}: expected {len(steps)}")
+        self._steps, self._values, self._glanced = steps.tolist(), values.tolist(), list(glanced)
+        self._updates = None if updates < 0 else updates
 
     def curve(self) -> Curve:
         """All points, with the returns of sampled episodes."""

@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from irl_gym.errors import DamagedFile
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.worlds import SteppedWorld
@@ -67,6 +68,23 @@ def test_a_curve_that_goes_on_from_what_was_kept_is_the_same(world):
     assert policy.asked == asked and all(
         np.array_equal(getattr(ours, key), getattr(theirs, key), equal_nan=True) for key in vars(ours)
     )
+
+
+@pytest.mark.parametrize(
+    ("world", "name", "value"),
+    [(stepped, "values", np.nan), (tabular, "glanced", 4), (tabular, "glanced", -1), (stepped, "glanced", np.inf),
+     (tabular, "steps", -1), (tabular, "updates", -7), (tabular, "updates", None), (tabular, "glanced", [[0, 1]]),
+     (stepped, "values", [0.0])],
+)  # fmt: skip
+def test_a_curve_that_no_training_in_this_world_leaves_is_refused(world, name, value):
+    glances = Glances(world(), lambda steps, told: None)
+    for steps in (0, 64):
+        glances.see(steps, Counting())
+    kept = dict(glances.arrays())
+    one = kept.pop(name)
+    kept |= {} if value is None else {name: np.array(value) if isinstance(value, list) else np.full(one.shape, value)}
+    with pytest.raises(DamagedFile, match=name):
+        glances.take(kept)
 
 
 @pytest.mark.parametrize("world", [stepped, tabular])

@@ -16,6 +16,7 @@ from irl_gym.learners.linear_programs.estimates import usable
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
 from irl_gym.mdp.episodes import Episode
 from irl_gym.programs import deadline
+from irl_gym.programs.killable import check_limit
 from irl_gym.programs.solvers import Status
 
 
@@ -132,6 +133,20 @@ def test_trajectory_lp_shares_its_time_among_all_rounds(monkeypatch):
         for result in TrajectoryLP(OneHot(8), trajectories=50, horizon=50, time_limit=1000.0).iterate(world, world.expert(20)):
             results.append(result)
     assert 0 < len(results) < 30
+
+
+def test_trajectory_lp_holds_its_limit_in_the_first_episodes_too(monkeypatch):
+    world, begun = Chain(), []
+
+    def sums(*args, **how):
+        begun.append(args)
+        monkeypatch.setattr(deadline.time, "monotonic", lambda: 1e12)  # the time is up
+        check_limit()
+
+    monkeypatch.setattr(world, "sums", sums)
+    with pytest.raises(SolverTimeout, match=r"no answer in 5\.0 s"):
+        next(TrajectoryLP(OneHot(8), trajectories=5, horizon=5, time_limit=5.0).iterate(world, world.expert(5)))
+    assert len(begun) == 1
 
 
 def test_trajectory_lp_cuts_all_where_a_time_limit_cut_the_expert():

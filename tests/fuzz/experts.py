@@ -13,8 +13,11 @@ from gymnasium import spaces
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
+from irl_gym.agents.checkpoints import Checkpoint
 from irl_gym.agents.experts import load_expert, training_of
+from irl_gym.agents.planners import SB3
 from irl_gym.agents.shown_observations import read_shown, read_statistics, write_shown
+from irl_gym.environments.tabular_vec_env import TabularVecEnv
 from irl_gym.errors import InvalidParameter
 from irl_gym.spaces.listed_states import ListedStates
 from irl_gym.spaces.states import StateIndex
@@ -90,3 +93,44 @@ def read_what_is_shown(folder):
             sound_statistics(normaliser)
             continue
         assert all(states.space.contains(states.decode(row)) for row in range(min(states.n_states, 20)))
+
+
+FEW = {
+    "PPO": {"n_steps": 8, "batch_size": 16, "n_epochs": 1},
+    "DQN": {"learning_starts": 8, "buffer_size": 40, "gradient_steps": 1, "batch_size": 8},
+}  # fmt: skip
+"""Of trainings of 64 steps, on two copies."""
+
+
+class _BrokenOff(Exception):
+    """Ends a training."""
+
+
+def trained(mdp, path, algorithm, until=None):
+    def look(steps, agent):
+        if until is not None and steps >= until:
+            raise _BrokenOff
+
+    env = TabularVecEnv(mdp, np.linspace(-1, 1, mdp.n_states), num_envs=2, max_episode_steps=9, seed=3)
+    planner = SB3(algorithm, total_timesteps=64, hyperparameters=FEW[algorithm])
+    return planner.plan(env, gamma=0.9, seed=3, progress=look, interval=2, checkpoint=Checkpoint(path, "it"))
+
+
+def write_trainings(mdp):
+    def write(folder):
+        for algorithm in FEW:
+            with contextlib.suppress(_BrokenOff):
+                trained(mdp, folder / f"{algorithm}.npz", algorithm, until=48)
+
+    return write
+
+
+def read_trainings(mdp):
+    """What goes on to its end ends in weights that act."""
+
+    def read(folder):
+        for algorithm in FEW:
+            model = trained(mdp, folder / f"{algorithm}.npz", algorithm).model
+            assert model.num_timesteps >= 64 and all(np.isfinite(one.detach()).all() for one in model.policy.parameters())
+
+    return read

@@ -22,12 +22,17 @@ from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
+from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.enumeration.explored import Explored, load_explored
 from irl_gym.tables.table_files import load_table, save_table
 from irl_gym.tables.tabulate import tabulate
 
 LAKE = {"is_slippery": True}
+RING = TabularMDP.from_dense(
+    np.stack([np.roll(np.eye(5), 1, axis=1), np.roll(np.eye(5), -1, axis=1)], axis=1), 0.9, np.eye(5)[0]
+)
+"""Two actions, both ways round five states."""
 ROWS = [Episode(np.array([0, 4, 8, 9]), np.array([1, 1, 2]), np.array([0.0, 0.0, 1.0]), True, False, seed=i) for i in range(3)]
 
 
@@ -199,6 +204,7 @@ READERS = {
     "expert": Reader(experts.write_experts, experts.read_experts, weight=1.5),
     "statistics": Reader(experts.write_statistics, experts.read_numbers, weight=3),
     "what an agent is shown": Reader(experts.write_what_is_shown, experts.read_what_is_shown, "*.shown.npz", weight=1.5),
+    "checkpoint": Reader(experts.write_trainings(RING), experts.read_trainings(RING), weight=0.1),
     "shards": Reader(write_shards, read_shards, weight=2),
     "Minari, HDF5": Reader(write_dataset("hdf5"), read_dataset, "lake-v0/data/*", weight=3),
     "Minari, Arrow": Reader(write_dataset("arrow"), read_dataset, "lake-v0/data/**/*", weight=2),

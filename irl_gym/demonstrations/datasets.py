@@ -5,6 +5,8 @@ folder of the root and renamed, so a broken one never carries an id; an id that 
 """
 
 import contextlib
+import hashlib
+import json
 import os
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
@@ -30,7 +32,7 @@ from irl_gym.errors import (
     NotDiscrete,
 )
 from irl_gym.files.hdf5_files import BROKEN
-from irl_gym.files.own_files import scratch
+from irl_gym.files.own_files import digest, scratch
 from irl_gym.mdp.episodes import Episode
 from irl_gym.spaces.states import States
 
@@ -175,6 +177,14 @@ def load_minari(dataset_id: str, *, root: str | os.PathLike | None = None) -> mi
             return minari.load_dataset(dataset_id)
         except BROKEN as error:
             raise broken(dataset_id, error) from error
+
+
+def digest_of(dataset: minari.MinariDataset) -> str:
+    """The sha256 of all files of a dataset together, by their names, in hexadecimal digits."""
+    folder = Path(dataset.storage.data_path)
+    there = (one for one in folder.rglob("*") if one.is_symlink() or one.is_file())
+    told = {one.relative_to(folder).as_posix(): os.readlink(one) if one.is_symlink() else digest(one) for one in there}
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
 def _ids(base: Path) -> list[str]:

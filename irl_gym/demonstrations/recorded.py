@@ -86,10 +86,11 @@ def _registered(name: str, spec: EnvSpec) -> EnvSpec:
                 NotTrusted, name, spec, f"with the argument {_shown(key)}, which may name a module or a file",
                 "Name it yourself, with --env-id and --env-kwargs",
             )  # fmt: skip
+    asked = {key: one for key, one in spec.kwargs.items() if (key, one) != ("render_mode", "human")}  # which opens a window
     limit = spec.max_episode_steps
     whole = isinstance(limit, int) and not isinstance(limit, bool) and limit > 0
     return replace(
-        here, kwargs={**here.kwargs, **spec.kwargs}, max_episode_steps=limit if whole else None,
+        here, kwargs={**here.kwargs, **asked}, max_episode_steps=limit if whole else None,
         additional_wrappers=tuple(_wrapper(name, spec, one, here) for one in spec.additional_wrappers
                                   if one.name not in WATCHING),
     )  # fmt: skip

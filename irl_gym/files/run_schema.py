@@ -98,14 +98,14 @@ class Config(TypedDict):
 
 
 class Version(TypedDict):
-    """run.json, of `claims.write_version`."""
+    """run.json, of `identity.write_version`."""
 
     irl_gym: Text
     command: list[Text] | None
 
 
 class EnvironmentFile(TypedDict):
-    """environment.json, of `claims.write_environment`."""
+    """environment.json, of `identity.write_environment`."""
 
     id: Text | None
     observations: Text
@@ -123,10 +123,11 @@ class Trained(TypedDict):
 
 
 class Start(TypedDict):
-    """start.json, of `claims.record_start`."""
+    """start.json, of `identity.record_start` and `record_dataset`."""
 
     files: list[Text]
     sha256: NotRequired[dict[Text, Digest]]
+    dataset: NotRequired[Digest]
 
 
 class Timed(Start):

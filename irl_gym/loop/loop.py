@@ -26,7 +26,7 @@ import gymnasium as gym
 
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
-from irl_gym.demonstrations.datasets import read_minari
+from irl_gym.demonstrations.datasets import load_minari, read_minari
 from irl_gym.demonstrations.shown import Shown
 from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.facts import counted
@@ -45,7 +45,7 @@ from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.runs.certificates import read_certificate
 from irl_gym.runs.experiment import Experiment, as_config
-from irl_gym.runs.identity import claim, record_start, write_environment, write_version
+from irl_gym.runs.identity import claim, record_dataset, record_start, write_environment, write_version
 from irl_gym.runs.named_parts import environment_of
 from irl_gym.runs.scorecard import TOLD_STAGES, read_metrics
 from irl_gym.runs.supply import missing, supplied
@@ -174,10 +174,10 @@ class Loop:
     @cached_property
     def given(self) -> list[Episode] | None:
         """The episodes of a dataset, as they are; None where none was given."""
-        asked = self.experiment
-        if asked.dataset is None:
+        if (asked := self.experiment).dataset is None:
             return None
-        return list(read_minari(asked.dataset, env=self.env, root=asked.dataset_root, after_end=asked.after_end))
+        record_dataset(self.path, found := load_minari(asked.dataset, root=asked.dataset_root))
+        return list(read_minari(found, env=self.env, after_end=asked.after_end))
 
     @cached_property
     def demonstrations(self) -> list[Episode]:

@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import minari
 from minari.serialization import serialize_space
 
+from irl_gym.demonstrations.datasets import digest_of
 from irl_gym.errors import RunConflict, RunNewer
 from irl_gym.files.run_folder import (
     NOT_THE_SAME,
@@ -131,8 +133,24 @@ def record_start(path: Path, *, table_kept: bool) -> None:
             "begun by another version of irl_gym? Choose another --out"
         )
         raise RunConflict(f"{path / TABLE} {told}.")
+    now |= {"dataset": before["dataset"]} if "dataset" in before else {}
     if before != now:
         write_record(path, START, now)
+
+
+def record_dataset(path: Path, dataset: minari.MinariDataset) -> None:
+    """Record the digest of a dataset that a run reads, which lies anywhere. Later stages have to read the same files.
+
+    Raises:
+        RunConflict: it is another than the one that stages were made from.
+    """
+    now, before = digest_of(dataset), read_record(path, START) or {}
+    made = [one for one in (path / STAGE_RECORDS).glob("*.json") if one.stem != START]
+    if made and before.get("dataset", now) != now:
+        told = f"dataset {dataset.spec.dataset_id!r} is not the one that stages of {path} were made from, by its sha256"
+        raise RunConflict(f"{told}: expected the same files. Choose another --out.")
+    if before.get("dataset") != now:
+        write_record(path, START, {"files": [], **before, "dataset": now})
 
 
 def into_folder(command: Sequence[str], folder: str = NEW_FOLDER) -> list[str]:

@@ -107,6 +107,11 @@ def test_a_wrapper_that_only_watches_is_left_out_so_that_no_video_is_written(dat
     assert env.spec.additional_wrappers == () and not (tmp_path / "videos").exists()
 
 
+@pytest.mark.parametrize(("asked", "made"), [("human", None), ("rgb_array", "rgb_array")])
+def test_no_window_is_opened_on_a_files_word(dataset, asked, made):
+    assert recorded_environment(dataset(spec={"kwargs": {**LAKE, "render_mode": asked}})).render_mode == made
+
+
 def test_no_wrapper_that_a_file_may_ask_for_takes_a_function():
     for name in OF_GYMNASIUM & set(dir(gym.wrappers)):
         kinds = inspect.signature(getattr(gym.wrappers, name)).parameters.values()

@@ -1,6 +1,8 @@
 """The loop from a dataset alone with FiniteLP: what it is told of the expert, and values that are cut alike for all."""
 
 import io
+import shutil
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -11,7 +13,7 @@ from irl_gym.agents.expert_files import FromFile
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.demonstrations.datasets import read_minari, write_minari
 from irl_gym.demonstrations.demonstrated import most_frequent
-from irl_gym.errors import DatasetMismatch, InvalidParameter
+from irl_gym.errors import DatasetMismatch, InvalidParameter, RunConflict
 from irl_gym.files.run_folder import read_json
 from irl_gym.judging.metrics import policy_value
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -82,6 +84,33 @@ def two(source, tmp_path_factory):
     return recover_and_retrain(
         Experiment(None, GAMMA, dataset="me/two-v0", dataset_root=str(root), learner=SOFT, **FEW), root / "run"
     )
+
+
+@pytest.mark.parametrize("unfinished", ["metrics", "all"])
+def test_a_dataset_that_was_swapped_is_named_unless_nothing_was_made_of_it(two, tmp_path, unfinished):
+    out, asked = shutil.copytree(two.out, tmp_path / "run"), dict(two.config)
+    data = shutil.copytree(two.out.parent / "me", tmp_path / "me")
+    experiment = Experiment(None, GAMMA, dataset="me/two-v0", dataset_root=asked["dataset_root"], learner=SOFT, **FEW)
+    for kept in (out / ".stages").glob("*.json"):
+        if unfinished in ("all", kept.stem) and kept.stem != "start":
+            kept.unlink()
+    place = Path(asked["dataset_root"]) / "me"
+    try:
+        shutil.rmtree(place / "two-v0")
+        write_minari(two_others(), "me/two-v0", gym.make("FrozenLake-v1", **LAKE), root=place.parent, algorithm="two")
+        if unfinished == "all":
+            assert recover_and_retrain(experiment, out).metrics["demonstrations"]["episodes"] == 3
+            return
+        with pytest.raises(RunConflict, match=r"dataset 'me/two-v0' is not the one that stages of .*\. Choose another --out\."):
+            recover_and_retrain(experiment, out)
+        assert recover_and_retrain(experiment, tmp_path / "another").metrics["demonstrations"]["episodes"] == 3
+    finally:
+        shutil.rmtree(place)
+        shutil.copytree(data, place)
+
+
+def two_others():
+    return [Episode(np.array([0, 4]), np.array([1]), np.zeros(1), False, True)] * 3
 
 
 def printed(report):

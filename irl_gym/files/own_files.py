@@ -47,13 +47,14 @@ def whole(path: str | os.PathLike) -> Iterator[BinaryIO]:
 
     Raises:
         InvalidParameter: there is a folder of the file's own name.
-        OSError: the system refused.
+        WriteFailed: the disk is full.
+        OSError: the system refused otherwise.
     """
     path = Path(path)
     if path.is_dir():
         raise InvalidParameter(f"{path} is a folder: expected a file, or nothing yet. Move it away, or write elsewhere.")
     sweep(path.parent)
-    with contextlib.ExitStack() as stack:
+    with _room(path), contextlib.ExitStack() as stack:
         beside, number = _new(path.parent, lambda one: os.open(one, os.O_WRONLY | _OURS_ALONE | _NO_LINK | _BYTES, 0o666))
         try:
             file = stack.enter_context(os.fdopen(number, "wb"))
@@ -82,20 +83,25 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, Any]) -> None:
 
 @contextlib.contextmanager
 def scratch(parent: Path) -> Iterator[Path]:
-    """A new folder in another, for files that are not finished; what is still in it at the end is removed."""
+    """A new folder in another, for files that are not finished; what is still in it at the end is removed.
+
+    Raises:
+        WriteFailed: the disk is full.
+    """
     sweep(parent)
 
     def make(folder: Path) -> int | None:
         folder.mkdir(mode=0o700)
         return None if fcntl is None else os.open(folder, os.O_RDONLY)  # Windows opens no folder
 
-    folder, number = _new(parent, make)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if number is not None:
-            os.close(number)
+    with _room(parent):
+        folder, number = _new(parent, make)
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            if number is not None:
+                os.close(number)
 
 
 def sweep(folder: Path) -> None:
@@ -233,6 +239,17 @@ def _gone(folder: Path) -> WriteFailed:
         f"{folder / LOCK} is gone: expected it to stay while {folder} is written into. Was the folder moved or deleted? The "
         "same command begins anew where there is none."
     )
+
+
+@contextlib.contextmanager
+def _room(place: Path) -> Iterator[None]:
+    """A block of writing, in which a full disk is told with the place and a mend."""
+    try:
+        yield
+    except OSError as error:
+        if (told := _told(error, place)) is None:
+            raise
+        raise told from error
 
 
 def _told(error: Exception, folder: Path) -> WriteFailed | None:

@@ -210,9 +210,12 @@ def test_a_folder_that_is_deleted_while_it_is_held_is_said_to_be_gone(tmp_path, 
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG])
-def test_a_full_disk_is_told_with_a_mend(tmp_path, number):
-    with pytest.raises(WriteFailed, match=r"make room, and the same command continues"), held(tmp_path / "run", "busy"):
+@pytest.mark.parametrize("writing", [lambda path: held(path, "busy"), whole, lambda path: scratch(path.parent)])
+def test_a_full_disk_is_told_with_a_mend(tmp_path, number, writing):
+    told = rf"^{tmp_path}\S* cannot be written any more .* make room, and the same command continues"
+    with pytest.raises(WriteFailed, match=told), writing(tmp_path / "run"):
         raise OSError(number, os.strerror(number))
+    assert names(tmp_path) == []
 
 
 def test_other_errors_are_left_as_they_are(tmp_path):

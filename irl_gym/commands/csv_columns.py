@@ -4,11 +4,12 @@ import hashlib
 import json
 import re
 import shlex
+import warnings
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from irl_gym.commands.terminal import UNSET
+from irl_gym.commands.terminal import UNSET, print_error
 from irl_gym.demonstrations.choices import Last
 from irl_gym.errors import DatasetMissing, InvalidDemonstrations, InvalidParameter
 
@@ -72,7 +73,7 @@ class Log:
         return f"csv/{name or 'log'}-{digest}-v0"
 
     def episodes(self, env: "gym.Env") -> "list[Episode]":
-        """The episodes of the file.
+        """The episodes of the file; what of it is left out is said on standard error.
 
         Args:
             env: they are checked against its spaces.
@@ -89,9 +90,14 @@ class Log:
         following = None if self.next_observation_columns in ((), (NONE,)) else _columns(self.next_observation_columns)
         seen = _columns(self.observation_columns)
         try:
-            return from_frame(self.csv, observation=seen, next_observation=following, last=self.last, env=env, **columns)
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                found = from_frame(self.csv, observation=seen, next_observation=following, last=self.last, env=env, **columns)
         except (InvalidDemonstrations, InvalidParameter) as error:
             raise type(error)(ARGUMENT.sub(self._option, str(error))) from error
+        for one in said:  # what is left out, in a line each
+            print_error(type(one.message)(ARGUMENT.sub(self._option, str(one.message))))
+        return found
 
     def _option(self, argument: re.Match[str]) -> str:
         """The option that stands for an argument on the command line; of several columns all are named."""

@@ -210,7 +210,7 @@ def print_table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]
 
 
 def print_error(error: Exception) -> None:
-    """A mistake of the user's, or what the system refused, in one line on standard error: the error's name, and its words."""
+    """What is wrong, or a warning, in one line on standard error: its name, and its words."""
     text = Text.assemble((type(error).__name__, "bold red"), f": {harmless(str(error))}")
     Console(stderr=True, soft_wrap=True).print(text)
 

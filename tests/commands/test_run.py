@@ -3,9 +3,11 @@
 import json
 import shutil
 
+import gymnasium as gym
 import pytest
 
 from irl_gym.commands.arguments import parse_seeds
+from irl_gym.commands.csv_columns import Log
 from irl_gym.errors import InvalidParameter, SolverFailed
 from irl_gym.files.run_folder import read_json
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -128,6 +130,17 @@ def test_a_file_that_cannot_be_right_leaves_nothing(irl_gym, here):
     done = irl_gym("run", *POND, "--csv", "log.csv", *COLUMNS, "--terminated-column", "done", "--out", "run")
     assert done.code == 2 and "line 3 of log.csv" in done.errors and done.errors.count("\n") == 1
     assert not (here / "run").exists()
+
+
+def test_what_a_file_loses_is_said_in_one_line_with_its_count_and_the_option(here, capsys):
+    (here / "log.csv").write_text(LOG)
+    env = gym.make("FrozenLake-v1", desc=["SF", "FG"], is_slippery=False)
+    log = Log(here / "log.csv", "ep", "t", ("cell",), "move", terminated_column="done", last="drop")
+    assert [len(one) for one in log.episodes(env)] == [1, 1]
+    said = (
+        "UserWarning: the last action of 2 of 2 episodes is dropped, with what it paid: give next observations, or --last keep"
+    )
+    assert (found := capsys.readouterr().err).startswith(said) and found.count("\n") == 1
 
 
 def test_a_run_is_no_folder_for_seeds(irl_gym, here):

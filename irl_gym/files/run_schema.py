@@ -1,7 +1,6 @@
 """What the json files of a run's folder hold, and the check that one does: whoever reads a file gets data of its shape.
 
-A shape says what is read, and of what kind that is; a file may hold more. Numbers are finite, and none is a boolean. Which
-files have which shape:
+A shape says what is read, of what kind; a file may hold more. Numbers are finite, and none is a boolean. Which file has which:
 
     config.json Config              films/*.json Film                  .stages/*.json RECORDS_OF
     run.json Version                grid.json Grid                     metrics.json metrics_schema.Metrics

@@ -61,15 +61,17 @@ class FitsLabels:
         """The agent of such arrays.
 
         Raises:
-            RuntimeError: they are those of another network.
+            DamagedFile: they are those of another network, or not finite.
         """
         import torch
 
+        from irl_gym.agents.checkpoint_checks import same_shapes
         from irl_gym.agents.planners import Agent
 
         states, space = self._shown(known)
         actions = spaces.Discrete(int(discrete_actions(known.actions).n))
         model = self._model(space, actions, np.random.default_rng(0))
+        same_shapes("weights", arrays, model.policy.state_dict())
         model.policy.load_state_dict({name: torch.as_tensor(one) for name, one in arrays.items()})
         return Agent(model, states)
 

@@ -129,7 +129,7 @@ def fitted(
         of: all that it depends on; what cannot be pickled is learned each time.
         fit: learns.
         arrays: of what was learned, numbers by name.
-        made: the same of these; raises ValueError, KeyError or RuntimeError where they are none.
+        made: the same of these; raises DamagedFile, ValueError or KeyError where they are none.
     """
     try:
         path = None if folder is None else folder / f"fit-{hashlib.sha256(pickle.dumps(of, protocol=4)).hexdigest()[:16]}.npz"
@@ -138,7 +138,7 @@ def fitted(
     if path is not None and path.exists():
         try:
             return made(read_arrays(path))
-        except (OSError, DamagedFile, ValueError, KeyError, RuntimeError):
+        except (OSError, DamagedFile, ValueError, KeyError):
             pass
     found = fit()
     if path is not None:

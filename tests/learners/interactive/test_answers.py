@@ -3,8 +3,10 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from models import random_model
 
+from irl_gym.agents.neural_clone import NeuralClone
 from irl_gym.agents.noise import noisy
 from irl_gym.agents.planners import ValueIteration
 from irl_gym.agents.simulator import Simulator
@@ -79,6 +81,21 @@ def test_what_was_learned_is_learned_again_where_its_file_is_damaged(tmp_path):
     for one in tmp_path.glob("fit-*.npz"):
         one.write_bytes(one.read_bytes()[:50])
     np.testing.assert_array_equal(asked(Person(0), SAMPLED, tmp_path).policy, found.policy)
+
+
+@pytest.mark.parametrize("change", [np.nan, 1e30, "x", None], ids=str)
+def test_a_network_whose_file_is_not_that_of_its_labels_is_trained_again(tmp_path, change):
+    learner = DAgger(rounds=1, learner=NeuralClone(net_arch=(2,), epochs=1), episodes=2, max_episode_steps=3)
+    whole = asked(Person(), learner, tmp_path / "kept")
+    (path,) = (tmp_path / "kept").glob("fit-*.npz")
+    with np.load(path) as found:
+        arrays = dict(found)
+    name = next(name for name in arrays if name.endswith("action_net.weight"))
+    one = arrays.pop(name)
+    held = {} if change is None else {name: np.array(change) if isinstance(change, str) else np.full_like(one, change)}
+    np.savez(path, **arrays, **held)
+    again = asked(Person(), learner, tmp_path / "kept")
+    assert torch.equal(*(one.policy.model.policy.action_net.weight for one in (whole, again)))
 
 
 def test_without_a_folder_nothing_is_kept_and_the_same_is_found(tmp_path):

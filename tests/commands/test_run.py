@@ -106,6 +106,15 @@ def test_a_file_goes_into_a_run_and_is_kept_there_as_a_dataset(irl_gym, here):
     assert irl_gym(*asked).code == 0 and (here / "run/report.html").exists()
 
 
+def test_a_file_of_states_alone_goes_into_a_run(irl_gym, here):
+    (here / "states.csv").write_text("episode,step,cell\na,0,0\na,1,2\na,2,3\nb,0,0\nb,1,2\nb,2,3\n")
+    alone = ("--csv", "states.csv", "--observation-columns", "cell", "--action-column", "none")
+    done = irl_gym("run", *POND, *alone, *FEW[2:], "--out", "run")
+    assert done.code == 0, done.errors
+    assert read_json(here / "run/metrics.json")["policies"]["retrained"]["score"] == 1.0
+    assert "actions inferred" in done.out and "4 can be of one action only" in " ".join(done.out.split())
+
+
 def test_a_file_that_changed_is_another_run(irl_gym, here):
     (here / "log.csv").write_text(LOG)
     asked = ("run", *POND, "--csv", "log.csv", *COLUMNS, "--terminated-column", "done", *FEW[2:], "--out", "run")

@@ -217,7 +217,8 @@ def cloned(
         return {"no_clone": f"{type(error).__name__}: {error}"}
     world.keep(outcome.policy, folder, CLONE)
     more = {"expert": "had the expert's whole policy", "oracle": "could ask the expert"}
-    told = [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
+    told = [] if outcome.inferred is None else ["; the actions of these steps are inferred"]
+    told += [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
     return {"how": f"{outcome.proof.brief}{''.join(told)}"}
 
 

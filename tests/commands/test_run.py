@@ -6,6 +6,7 @@ import shutil
 import pytest
 
 from irl_gym.commands.arguments import parse_seeds
+from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.errors import InvalidParameter, SolverFailed
 from irl_gym.files.run_folder import read_json
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -113,6 +114,13 @@ def test_a_file_of_states_alone_goes_into_a_run(irl_gym, here):
     assert done.code == 0, done.errors
     assert read_json(here / "run/metrics.json")["policies"]["retrained"]["score"] == 1.0
     assert "actions inferred" in done.out and "4 can be of one action only" in " ".join(done.out.split())
+
+
+def test_an_export_may_leave_the_actions_out(irl_gym, here):
+    asked = ("export", *POND, "--dataset-id", "me/pond-v0", "--root", "data", "--episodes", "2", "--states-only")
+    done = irl_gym(*asked)
+    assert done.code == 0, done.errors
+    assert [one.actions for one in read_minari("me/pond-v0", root="data")] == [None, None]
 
 
 def test_a_file_that_changed_is_another_run(irl_gym, here):

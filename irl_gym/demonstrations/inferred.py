@@ -118,7 +118,7 @@ def infer(episodes: Iterable[Episode], states: States, table: TransitionTable) -
     counts = np.bincount(numbers, minlength=unique.size).astype(np.float64)
     here, there = np.divmod(unique, table.n_states)
     likelihood = _likelihood(table, here, there)
-    explained = likelihood.any(axis=1)
+    explained = np.asarray(likelihood.any(axis=1))
     lost = np.flatnonzero(~explained[numbers])
     first = "" if not lost.size else "episode {}, step {}".format(*places[lost[0]])
     if not explained.any():

@@ -24,7 +24,7 @@ from irl_gym.facts import counted
 
 OF_EXPERT = (
     "max_states", "expert", "expert_normalize", "epsilon", "episodes", "steps", "max_episode_steps", "total_timesteps", "gamma",
-    "seed",
+    "seed", "states_only",
 )  # fmt: skip
 """Options that a file leaves nothing to say of."""
 
@@ -63,6 +63,8 @@ class Arguments:
     """Discount that the expert plans or learns with, between 0 and 1."""
     seed: int = 0
     """Of everything that is drawn: the same seed gives the same episodes."""
+    states_only: bool = False
+    """Leave the actions out, as if they had not been recorded."""
     format: Literal["hdf5", "arrow"] = "hdf5"
     """One file; or a folder an episode, which needs the extra `data`."""
     root: Annotated[Path | None, UNSET] = None
@@ -116,7 +118,7 @@ def exported(arguments: Arguments) -> tuple[Any, str | None]:
     Raises:
         IrlGymError: no such environment, expert or file, or an id that is taken.
     """
-    from irl_gym.commands.demonstrating.demonstrators import Recording
+    from irl_gym.commands.demonstrating.demonstrators import Recording, StatesAlone
     from irl_gym.demonstrations.datasets import described
     from irl_gym.demonstrations.export import Amount, export_dataset
     from irl_gym.demonstrations.minari_files import unkept
@@ -142,9 +144,10 @@ def exported(arguments: Arguments) -> tuple[Any, str | None]:
     about = described(
         arguments.dataset_id, None if lost else env, env.observation_space, env.action_space, arguments.format, metadata
     )
+    kind, plan = (StatesAlone, {"states_only": True}) if arguments.states_only else (lambda one: one, {})
     with stage_bars(Console(stderr=True)) as show:  # so that they are seen where the rest is piped
         dataset = export_dataset(
-            lambda folder: recording.demonstrator(env, folder, lambda share: show("expert", share)),
-            about, amount, recording.plan(env), root=arguments.root, on_progress=show,
+            lambda folder: kind(recording.demonstrator(env, folder, lambda share: show("expert", share))),
+            about, amount, recording.plan(env) | plan, root=arguments.root, on_progress=show,
         )  # fmt: skip
     return dataset, lost

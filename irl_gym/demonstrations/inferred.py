@@ -118,7 +118,7 @@ def infer(episodes: Iterable[Episode], states: States, table: TransitionTable) -
     counts = np.bincount(numbers, minlength=unique.size).astype(np.float64)
     here, there = np.divmod(unique, table.n_states)
     likelihood = _likelihood(table, here, there)
-    explained = likelihood.any(axis=1)
+    explained = np.asarray(likelihood.any(axis=1))
     lost = np.flatnonzero(~explained[numbers])
     first = "" if not lost.size else "episode {}, step {}".format(*places[lost[0]])
     if not explained.any():
@@ -137,7 +137,8 @@ def infer(episodes: Iterable[Episode], states: States, table: TransitionTable) -
     weights, policy = np.zeros((table.n_states, table.n_actions)), np.full((table.n_states, table.n_actions), np.nan)
     members = np.zeros(same.shape)
     np.add.at(members, (np.arange(acted.size)[:, None], same), 1)
-    weights[acted] = N[:, None] * np.take_along_axis(found.weights / np.maximum(members, 1), same, axis=1)
+    shared = np.take_along_axis(found.weights / np.maximum(members, 1), same, axis=1)
+    weights[acted] = N[:, None] * shared / shared.sum(axis=1, keepdims=True)
     best, decided = _largest(found)
     chosen = same == best[:, None]
     policy[acted[decided]] = (chosen / chosen.sum(axis=1, keepdims=True))[decided]

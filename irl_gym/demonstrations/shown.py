@@ -19,7 +19,7 @@ from irl_gym.spaces.states import States
 
 
 @dataclass(frozen=True, eq=False)
-class Shown(Record):
+class ShownPolicy(Record):
     """What demonstrations show of an expert."""
 
     weights: Matrix
@@ -38,7 +38,7 @@ class Shown(Record):
         return np.divide(self.weights, total, out=np.full(self.weights.shape, 1 / self.weights.shape[1]), where=total > 0)
 
 
-def shown(episodes: Sequence[Episode], states: States, n_actions: int, table: TransitionTable | None) -> Shown:
+def shown(episodes: Sequence[Episode], states: States, n_actions: int, table: TransitionTable | None) -> ShownPolicy:
     """Count the actions of episodes; of episodes that have none infer them from a table.
 
     Args:
@@ -61,6 +61,6 @@ def shown(episodes: Sequence[Episode], states: States, n_actions: int, table: Tr
                 "`irl_gym.demonstrations.inferred.without_actions(episodes)`."
             )
         found = infer(every, states, table)
-        return Shown(found.weights, found.policy, found.visits, found)
+        return ShownPolicy(found.weights, found.policy, found.visits, found)
     seen = empirical_policy(every, states, n_actions)
-    return Shown(seen.counts.astype(np.float64), most_frequent(seen), visits(seen))
+    return ShownPolicy(seen.counts.astype(np.float64), most_frequent(seen), visits(seen))

@@ -187,11 +187,16 @@ def without_chance(episodes: Sequence[Episode], table: Tabulation | None) -> boo
         return False
     mdp, first = table.mdp, episodes[0]
     rows, actions = first.rows(table.states), first.actions
-    if actions is None:  # then other actions may have made the same steps
+    if any(not np.array_equal(one.rows(table.states), rows) for one in episodes):
         return False
-    if any(not (np.array_equal(one.rows(table.states), rows) and np.array_equal(one.actions, actions)) for one in episodes):
+    if actions is not None and any(not np.array_equal(one.taken("one that was given"), actions) for one in episodes):
         return False
-    taken = mdp.P[rows[:-1] * mdp.n_actions + actions]
+    pairs = rows[:-1, None] * mdp.n_actions + np.arange(mdp.n_actions)
+    if actions is None:  # then every action that can have made a step counts
+        acted = np.asarray(mdp.P[pairs.ravel(), np.repeat(rows[1:], mdp.n_actions)]).reshape(pairs.shape) > 0
+    else:
+        acted = np.eye(mdp.n_actions, dtype=bool)[actions]
+    taken = mdp.P[pairs[acted]]
     return np.count_nonzero(mdp.d0) == 1 and int((taken > 0).sum(axis=1).max(initial=0)) <= 1
 
 

@@ -23,7 +23,7 @@ from gymnasium import spaces
 from irl_gym._typing import Vector
 from irl_gym.checks import checked_number
 from irl_gym.demonstrations.inferred import Inferred
-from irl_gym.demonstrations.shown import Shown, shown
+from irl_gym.demonstrations.shown import ShownPolicy, shown
 from irl_gym.environments.generative import GenerativeModel
 from irl_gym.errors import InvalidMDP, InvalidParameter, InvalidPolicy, MissingPart, a_type
 from irl_gym.features.feature_maps import FeatureMap, as_features, check_length
@@ -242,7 +242,7 @@ class Problem(Record):
         return empirical_policy(self.demonstrations, *self._numbered)
 
     @cached_property
-    def shown(self) -> Shown:
+    def shown(self) -> ShownPolicy:
         """The same, and what they do most; of episodes of states alone as a table tells (`irl_gym.demonstrations.inferred`).
 
         Raises:

@@ -27,7 +27,7 @@ import gymnasium as gym
 from irl_gym.agents.planners import Planner
 from irl_gym.agents.simulator import Simulator
 from irl_gym.demonstrations.datasets import load_minari, read_minari
-from irl_gym.demonstrations.shown import Shown
+from irl_gym.demonstrations.shown import ShownPolicy
 from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.facts import counted
 from irl_gym.features.linear_reward import LinearReward, check_savable, load_reward
@@ -187,7 +187,7 @@ class Loop:
         return list(read_minari(self.stage("demonstrations")["dataset_id"], root=self.path / "dataset"))
 
     @cached_property
-    def seen(self) -> Shown | None:
+    def seen(self) -> ShownPolicy | None:
         """What the episodes show of the expert in the table; None where a learner is given its whole policy."""
         return self.world.seen(self.demonstrations) if self.experiment.from_episodes else None
 

@@ -20,7 +20,7 @@ from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.datasets import load_minari, write_minari
 from irl_gym.demonstrations.endings import left_out
 from irl_gym.demonstrations.minari_files import dataset_name, unkept
-from irl_gym.demonstrations.shown import Shown
+from irl_gym.demonstrations.shown import ShownPolicy
 from irl_gym.errors import DamagedFile, InvalidParameter, InvalidReward, IrlGymError
 from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.metrics_schema import Certificate
@@ -87,7 +87,7 @@ def planned_expert(
     return {"planner": type(teacher).__name__, "how": how_of(teacher), **made}
 
 
-def recorded_expert(folder: Path, dataset: str, seen: Shown | None) -> dict[str, Any]:
+def recorded_expert(folder: Path, dataset: str, seen: ShownPolicy | None) -> dict[str, Any]:
     """What a dataset shows of an expert, in the states of a table."""
     if seen is None:
         return {"planner": "unknown: the dataset's"}
@@ -217,7 +217,8 @@ def cloned(
         return {"no_clone": f"{type(error).__name__}: {error}"}
     world.keep(outcome.policy, folder, CLONE)
     more = {"expert": "had the expert's whole policy", "oracle": "could ask the expert"}
-    told = [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
+    told = [] if outcome.inferred is None else ["; the actions of these steps are inferred"]
+    told += [f"; the learner {what}" for part, what in more.items() if getattr(problem, part) is not None]
     return {"how": f"{outcome.proof.brief}{''.join(told)}"}
 
 

@@ -15,7 +15,7 @@ from irl_gym.agents.noise import noisy
 from irl_gym.agents.planners import FOR_ADVANTAGES, SB3, Agent, Planner, ValueIteration, tabular_actions
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.endings import in_table
-from irl_gym.demonstrations.shown import Shown, shown
+from irl_gym.demonstrations.shown import ShownPolicy, shown
 from irl_gym.environments.rollouts import run_episodes
 from irl_gym.environments.tabular_vec_env import TabularVecEnv, shows_rows
 from irl_gym.errors import UnknownObservation
@@ -200,7 +200,7 @@ class TableWorld:
         """Recorded episodes as an exact table knows them."""
         return list(in_table(episodes, self.mdp, self.states, after_end)) if self.table.evidence.exact else episodes
 
-    def seen(self, episodes: list[Episode]) -> Shown:
+    def seen(self, episodes: list[Episode]) -> ShownPolicy:
         """How often each action was taken in each state, as recorded, or as the table tells of states alone."""
         return shown(episodes, self.states, self.mdp.n_actions, self.mdp)
 

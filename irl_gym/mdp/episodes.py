@@ -2,7 +2,7 @@
 
 An episode of T steps has T + 1 observations, T actions, T rewards, and ends by `terminated` or `truncated`. Where nobody wrote
 down what the last action led to, `ending` says so: the pair counts for the policy, and nothing is made of its successor.
-Actions may be missing, all of an episode or none: who cannot do without asks for them by `taken`, and none is ever made up.
+Actions may be missing, all of an episode or none: who cannot do without asks for them by `taken`. None is ever made up.
 Axes: S states, A actions, K features, T steps, N episodes.
 """
 
@@ -28,7 +28,6 @@ WITHOUT_ACTIONS = (
     "Record the actions too; or learn from states alone, where the table is known with FiniteLP, FeatureLP or Clone, else with "
     "TrajectoryLP."
 )
-"""What can be done with an episode without actions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +90,7 @@ class Episode(Record):
         return len(self.rewards)
 
     def taken(self, who: str) -> np.ndarray:
-        """(T,) the actions, for who cannot do without.
-
-        Args:
-            who: the episode as an error calls it, and who needs its actions.
+        """(T,) the actions, for whom an error names with the episode.
 
         Raises:
             InvalidDemonstrations: it has none.

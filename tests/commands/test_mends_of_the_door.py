@@ -19,6 +19,8 @@ CASES = [
     ("Name the right one with --observation-columns NAME", ("run", *POND, *CSV[:2]), ("run", *POND, *CSV)),
     ("Did you mean --observation-columns cell?", ("run", *POND, *CSV[:3], "cel"), ("run", *POND, *CSV)),
     ("Did you mean --action-column action?", ("run", *POND, *CSV, "--action-column", "actoin"), ("run", *POND, *CSV)),
+    ("If only the states are known, pass --action-column none.", ("run", *POND, *CSV, "--action-column", "u"),
+     ("run", *POND, *CSV, "--action-column", "none")),
     ("Pass --step-column none if", ("run", *POND, *CSV, "--step-column", "cell"),
      ("run", *POND, *CSV, "--step-column", "none")),
     ("Leave the other out.", ("run", "--seed", "1", "--seeds", "0,1"), ("learners",)),

@@ -8,6 +8,7 @@ import pytest
 
 from irl_gym.commands.arguments import parse_seeds
 from irl_gym.commands.csv_columns import Log
+from irl_gym.demonstrations.datasets import read_minari
 from irl_gym.errors import InvalidParameter, SolverFailed
 from irl_gym.files.run_folder import read_json
 from irl_gym.learners.linear_programs.finite import FiniteLP
@@ -106,6 +107,22 @@ def test_a_file_goes_into_a_run_and_is_kept_there_as_a_dataset(irl_gym, here):
     assert read_json(here / "run/metrics.json")["policies"]["retrained"]["score"] == 1.0
     (here / "run/report.html").unlink()
     assert irl_gym(*asked).code == 0 and (here / "run/report.html").exists()
+
+
+def test_a_file_of_states_alone_goes_into_a_run(irl_gym, here):
+    (here / "states.csv").write_text("episode,step,cell\na,0,0\na,1,2\na,2,3\nb,0,0\nb,1,2\nb,2,3\n")
+    alone = ("--csv", "states.csv", "--observation-columns", "cell", "--action-column", "none")
+    done = irl_gym("run", *POND, *alone, *FEW[2:], "--out", "run")
+    assert done.code == 0, done.errors
+    assert read_json(here / "run/metrics.json")["policies"]["retrained"]["score"] == 1.0
+    assert "actions inferred" in done.out and "4 can be of one action only" in " ".join(done.out.split())
+
+
+def test_an_export_may_leave_the_actions_out(irl_gym, here):
+    asked = ("export", *POND, "--dataset-id", "me/pond-v0", "--root", "data", "--episodes", "2", "--states-only")
+    done = irl_gym(*asked)
+    assert done.code == 0, done.errors
+    assert [one.actions for one in read_minari("me/pond-v0", root="data")] == [None, None]
 
 
 def test_a_file_that_changed_is_another_run(irl_gym, here):

@@ -42,7 +42,7 @@ def test_a_mixture_is_as_likely_as_that_of_many_steps_of_em_and_says_how_near_it
     L, q = rng.random((6, 4)) * (rng.random((6, 4)) < 0.7) + 1e-3, rng.dirichlet(np.ones(6))
     found, w = most_likely(L, q, np.array([0])), np.full(4, 0.25)
     for _ in range(20_000):
-        w = w * (q / (L @ w)) @ L
+        w = w * ((q / (L @ w)) @ L)
     likely = [float(q @ np.log(L @ one)) for one in (found.weights[0], w)]
     assert likely[0] >= likely[1] - 1e-9 and found.short[0] < 1e-9
     assert (L.T @ (q / (L @ found.weights[0]))).max() <= 1 + 1e-9  # Lindsay's condition
@@ -121,9 +121,9 @@ def test_a_step_whose_successor_was_not_recorded_tells_nothing():
 
 
 def test_the_facts_say_how_much_was_inferred():
-    found = infer(states_of([0, 1, 0], [0, 2, 0]), THREE, FORK).facts()
+    found = infer(states_of([0, 1, 0], [0, 1]), THREE, FORK).facts()
     assert found[0].sentence.startswith(
-        "from where 4 steps in 3 states led, since the episodes have none: 3 can be of one action only, 1 of several"
+        "from where 3 steps in 2 states led, since the episodes have none: 2 can be of one action only, 1 of several"
     )
     assert [one.label for one in found] == ["actions inferred", "actions undecided", "actions alike"]
 

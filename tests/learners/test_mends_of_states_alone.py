@@ -25,7 +25,7 @@ from irl_gym.mdp.tabular_mdp import TabularMDP
 from irl_gym.tables.counted.counting import Counting
 
 MDP = TabularMDP(FORK.P, 0.9, FORK.d0)
-ALONE = states_of([0, 2, 0], [0, 2, 2])
+ALONE, ALIKE = states_of([0, 2, 0], [0, 2, 2]), states_of([0, 1, 0])
 ACTED = [Episode(one.observations, np.array(taken), one.rewards, False, True)
          for one, taken in zip(ALONE, ([2, 0], [2, 1]), strict=True)]  # fmt: skip
 STEPS = FiniteLP(reward_on="state-action")
@@ -47,8 +47,9 @@ CASES = [
      lambda: Counting().count(ALONE, THREE.space, 3, gamma=0.9),
      lambda: [on_table(one) for one in (FiniteLP(slack=1.0), FeatureLP(OneHot(3)), Clone())]),
     ("else with TrajectoryLP.", lambda: Clone().learn(Problem(Problem.of(MDP).spaces, ALONE)), by_trajectories),
-    ("Record the actions too,", lambda: on_table(STEPS), lambda: on_table(STEPS, ACTED)),
-    ('or use reward_on="state" (--reward-on state).', lambda: on_table(STEPS), lambda: on_table(FiniteLP(slack=1.0))),
+    ("Record the actions too,", lambda: on_table(STEPS, ALIKE), lambda: on_table(STEPS, ACTED)),
+    ('or use reward_on="state" (--reward-on state).',
+     lambda: on_table(STEPS, ALIKE), lambda: on_table(FiniteLP(slack=1.0), ALIKE)),
     ("Give the table of the environment in which the episodes were recorded.",
      lambda: infer(states_of([0, 0]), THREE, FORK), lambda: infer(states_of([0, 1]), THREE, FORK)),
     ("Leave the others out,",

@@ -54,7 +54,7 @@ def test_a_linear_program_recovers_the_reward_from_states_alone(lake, learner):
 def test_a_clone_of_states_alone_goes_where_the_expert_went(lake, learner):
     table, value, _ = lake
     found = alone(lake, learner)
-    assert policy_value(table.mdp, table.reward, found.policy) > 0.97 * value
+    assert policy_value(table.mdp, table.reward, found.policy) > 0.95 * value
     assert found.inferred is not None and found.proved()["facts"][1]["label"] == "actions inferred"
 
 

@@ -8,7 +8,7 @@ Axes: S states, A actions, T steps, n episodes of a chunk.
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,18 @@ CHUNK = 2048
 
 OnTraining = Callable[[float], None]
 """Told the share of an agent's training that is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class StatesAlone:
+    """Another's episodes without their actions."""
+
+    whole: Demonstrator
+    """Whose."""
+
+    def episodes(self, first: int) -> Iterator[Episode]:
+        """Episodes first, first + 1, ... without end."""
+        return (replace(one, actions=None) for one in self.whole.episodes(first))
 
 
 @dataclass(frozen=True, eq=False)

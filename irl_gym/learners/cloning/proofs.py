@@ -19,6 +19,9 @@ from irl_gym._typing import Matrix, StateMask
 from irl_gym.facts import Fact, counted, plain
 from irl_gym.mdp.tabular_mdp import TransitionTable
 
+ROUNDING = 1e-12
+"""Share of a sum of weights up to which it is a whole number."""
+
 
 @dataclass(frozen=True)
 class CloneProof:
@@ -58,7 +61,8 @@ class CloneProof:
         if self.unshown:
             told = f"{self.unshown:,} of the {self.acting:,} {where}: {self.elsewhere}"
             nothing = Fact("without demonstrations", told, "open")
-        steps = f"{self.steps:,.0f} steps" if self.steps == round(self.steps) else f"steps of a weight of {self.steps:.6g}"
+        whole = abs(self.steps - round(self.steps)) < ROUNDING * self.steps  # but for rounding, where actions were inferred
+        steps = f"{self.steps:,.0f} steps" if whole else f"steps of a weight of {self.steps:.6g}"
         least = f"{self.least_mistakes:.4%} with the most frequent actions"
         found = (
             Fact("learned from", f"{steps}, in {counted(self.shown)}"),

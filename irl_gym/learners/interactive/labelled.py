@@ -47,7 +47,7 @@ class LabelledEpisode(Episode):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("labels", "asked"):
-            if np.shape(getattr(self, name)) != self.actions.shape:
+            if np.shape(getattr(self, name)) != (len(self),):
                 raise InvalidDemonstrations(
                     f"{name} have shape {np.shape(getattr(self, name))}: expected ({len(self)},), one a step."
                 )

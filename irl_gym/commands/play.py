@@ -119,7 +119,7 @@ def be_asked(asked: Arguments) -> int:
             return 1 if isinstance(end, Left) else 130
     print(*(f"{one.label}: {one.sentence}." for one in found.facts()), sep="\n")
     kept = next(one for one in (out / "policy.npz", out / "policy.zip") if one.exists())
-    print(f"What was learned is in {kept}, and the episodes with your answers in {out / 'labels'}. Look at it with")
+    print(f"What was learned is in {kept}, and the episodes with your answers in {out / 'labels'}. Its own episodes:")
     words = ["irl-gym", "export", "--env-id", asked.env_id, *(("--env-kwargs", *asked.env_kwargs) if asked.env_kwargs else ())]
     print(f"    {shlex.join([*words, '--expert', str(kept), '--episodes', '100', '--dataset-id', 'irl_gym/learned-v0'])}")
     return 0

@@ -57,7 +57,7 @@ class Person:
     @property
     def help(self) -> str:
         """The keys."""
-        return f"{self.controls} Where the learner acts: let it ({' '.join(LET)})."
+        return f"{self.controls} Where the learner would act: it may ({' '.join(LET)})."
 
     def __call__(self, observation: Any, info: Mapping[str, Any]) -> int:
         """What the person does, or did when it took over just now.

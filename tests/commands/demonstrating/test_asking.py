@@ -1,6 +1,7 @@
 """A person as oracle, whose keyboard is a script."""
 
 import io
+import shlex
 import signal
 import sys
 
@@ -19,6 +20,7 @@ WAY = "ddsssd"
 def typed(monkeypatch, capsys, tmp_path, unchecked):
     """The command with these keys: its exit code, and what it says."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def run(keys, *more):
@@ -40,6 +42,7 @@ def test_who_watches_lets_the_learner_act_and_takes_over(typed, tmp_path):
     code, said = typed(f"{WAY}\n...s..\ns..\n", "--out", "here")
     assert code == 0, said
     assert "The learner is about to do: right." in said and "asked 7 times, in 6 states, over 2 rounds" in said
+    assert main(shlex.split(said.splitlines()[-1])[1:]) == 0  # what acts as it learned
     policy = np.load(tmp_path / "here/policy.npz")["probabilities"]
     assert policy[[0, 1, 2, 6, 10, 14]].argmax(axis=1).tolist() == [2, 2, 1, 1, 1, 2]
     first, second = load_minari("irl_gym/frozenlake-v1-labels-v0", root=tmp_path / "here/labels").iterate_episodes()
@@ -75,7 +78,7 @@ def test_the_same_command_after_the_end_asks_nobody(typed, tmp_path):
 
 def test_help_and_strange_keys_are_told_and_q_leaves(typed):
     code, said = typed("?zdq", "--out", "here")
-    assert code == 1 and said.count("let it (enter .)") >= 2 and "'z' is no key here" in said
+    assert code == 1 and said.count("it may (enter .)") >= 2 and "'z' is no key here" in said
     assert "Answers that are kept in here: 1." in said
 
 

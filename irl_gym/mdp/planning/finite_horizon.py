@@ -57,7 +57,7 @@ def backward_induction(
         InvalidParameter: a horizon that is no whole number of at least 1, or a preference that is none.
         InvalidDiscount: gamma outside (0, 1].
     """
-    steps = Steps(table, R, horizon, gamma)
+    steps = StepsWithin(table, R, horizon, gamma)
     H, shape = steps.horizon, (table.n_states, table.n_actions)
     V, Q = np.zeros((H + 1, shape[0])), np.zeros((H, *shape))
     policy = np.zeros((H, shape[0]), dtype=np.int64)
@@ -83,7 +83,7 @@ def evaluation_within(table: TransitionTable, R: Any, policy: Any, *, horizon: i
     Raises:
         InvalidPolicy: wrong shape or content; and as `backward_induction`.
     """
-    steps = Steps(table, R, horizon, gamma)
+    steps = StepsWithin(table, R, horizon, gamma)
     V = np.zeros((steps.horizon + 1, table.n_states))
     for h, (P, paid) in zip(range(steps.horizon - 1, -1, -1), steps.under(policy, backwards=True), strict=True):
         V[h] = paid + steps.gamma * (P @ V[h + 1])
@@ -95,7 +95,7 @@ def value_within(table: TransitionTable, R: Any, policy: Any, *, horizon: int, g
 
     Arguments and errors as `evaluation_within`.
     """
-    steps = Steps(table, R, horizon, gamma)
+    steps = StepsWithin(table, R, horizon, gamma)
     at, value = table.d0, 0.0
     for h, (P, paid) in enumerate(steps.under(policy)):
         value += steps.gamma**h * float(at @ paid)
@@ -110,7 +110,7 @@ def occupancy_within(table: TransitionTable, policy: Any, *, horizon: int, gamma
 
     Arguments and errors as `evaluation_within`.
     """
-    steps = Steps(table, np.zeros((table.n_states, table.n_actions)), horizon, gamma)
+    steps = StepsWithin(table, np.zeros((table.n_states, table.n_actions)), horizon, gamma)
     each = policy_over_time(policy, table.n_states, table.n_actions, steps.horizon)
     mu, at = np.zeros_like(each), np.where(table.terminal, 0.0, table.d0)
     for h, distribution in enumerate(each):
@@ -119,7 +119,7 @@ def occupancy_within(table: TransitionTable, policy: Any, *, horizon: int, gamma
     return mu
 
 
-class Steps:
+class StepsWithin:
     """What each of H steps pays and does; arguments and errors as `backward_induction`."""
 
     def __init__(self, table: TransitionTable, R: Any, horizon: int, gamma: float):

@@ -1,8 +1,9 @@
 """Does copying the demonstrations do as well? The clone of a run beside the policy that its learner is judged by.
 
 It does as well if it has at most `NEAR` of what the expert has over random actions less than the agent, and worse if it has
-more than that less. Values count where they are exact; mean returns, where they make a scale (`shares`), by the 95 % interval
-of their difference: against what exact values say only if all of it is beyond `NEAR`. What neither settles is undecided.
+more than that less. Values count where they are exact; returns, where they make a scale (`shares`), expected ones where these
+are known, else mean ones by the 95 % interval of their difference: against what exact values say only if all of it is beyond
+`NEAR`. What neither settles is undecided.
 """
 
 import math
@@ -33,7 +34,7 @@ def copied(metrics: Mapping[str, Any], episodes: int) -> Copied | None:
     clone, agent = rows[CLONE], rows[agent_of(rows)]
     exact = table is not None and table.get("exact", True) and clone["score"] is not None
     short = agent["score"] - clone["score"] if exact else None
-    apart = _apart(*(returns_of(row) for row in (clone, agent, rows[EXPERT], rows[RANDOM])), episodes=episodes)
+    apart = _apart(*(_returns(row) for row in (clone, agent, rows[EXPERT], rows[RANDOM])), episodes=episodes)
     if (short is not None and short > NEAR) or (apart is not None and apart.high < -NEAR):
         return "worse"
     settled = short is not None or (apart is not None and apart.low >= -NEAR)
@@ -43,7 +44,7 @@ def copied(metrics: Mapping[str, Any], episodes: int) -> Copied | None:
 def _apart(
     clone: Interval | None, agent: Interval | None, expert: Interval | None, random: Interval | None, *, episodes: int
 ) -> Interval | None:
-    """The clone's mean return less the agent's, in shares of what the expert has over random actions; None without a scale."""
+    """The clone's return less the agent's, in shares of what the expert has over random actions; None without a scale."""
     if clone is None or agent is None or share_of_return(clone, expert, random) is None:
         return None
     assert expert is not None and random is not None
@@ -73,8 +74,15 @@ def copied_told(metrics: Mapping[str, Any], episodes: int) -> str:
     return f"{opening}: the clone ({clone['how']}) has {found}, {the(name)} {' and '.join(_earned(rows[name]).values())}{less}."
 
 
+def _returns(row: Mapping[str, Any]) -> Interval | None:
+    """A row's expected return, where it is known exactly; else its mean return."""
+    exact = row.get("expected_return")
+    return returns_of(row) if exact is None else Interval(exact, exact, exact)
+
+
 def _earned(row: Mapping[str, Any]) -> dict[str, str]:
-    """A row's mean return and score, where it has them."""
-    returns, score = returns_of(row), row["score"]
+    """A row's return and score, where it has them."""
+    returns, score, exact = _returns(row), row["score"], row.get("expected_return") is not None
     told = {} if returns is None else {"a mean return of": with_ends(returns, partial(number, digits=3))}
+    told = {"an expected return of": number(row["expected_return"])} if exact else told
     return told if score is None else {**told, "a score of": score_of(score)}

@@ -62,6 +62,13 @@ def test_the_sentence_has_the_figures_of_both(clone, words):
     assert words in told and told.endswith(f", the retrained agent 95 (86 to 104) and 0.995{less}.")
 
 
+def test_expected_returns_count_more_than_mean_returns_where_they_are_known():
+    told = metrics((0.999, 95, 9), (0.995, 95, 9))
+    for name, exact in {"clone": 60.0, "retrained": 95.0, "expert": 100.0, "random": 0.0}.items():
+        told["policies"][name]["expected_return"] = exact
+    assert copied(told, 200) == "worse" and "has an expected return of 60 and a score of 0.999" in copied_told(told, 200)
+
+
 def test_what_is_undecided_says_so():
     assert copied_told(metrics((0.9, 85, 9), (0.9, 95, 9), None), 200).startswith("Whether copying the demonstrations does as")
 

@@ -117,7 +117,7 @@ class TabularVecEnv(VecEnv):
         if self.table.terminal[rows].any() or elapsed.max() >= self._limit:
             raise InvalidInput(
                 f"copies stand in {rows[:9]} after {elapsed[:9]} steps: expected states that act, and at most "
-                f"{self._limit - 1:,} steps. Give what `moment` gave."
+                f"{self._limit - 1:,} steps, as `moment` gave them."
             )
         self._rng.bit_generator.state = json.loads(str(moment["generator"]))
         self._rows, self._elapsed, self._returns = rows, elapsed, returns

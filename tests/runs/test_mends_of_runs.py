@@ -177,6 +177,7 @@ def test_a_mend_that_the_folder_of_a_run_names_serves(finished, unvouched, says,
 FILES = [f"{one}.py" for one in ("experiment", "world_choice", "worlds", "run_reader", "runs/run", "identity", "checks",
                                  "terminal", "verified", "pipeline", "closing")]  # fmt: skip
 ELSEWHERE = [
+    "expected the same files. Choose another --out.",  # test_pipeline_from_data
     "Make one, such as `irl_gym.Experiment('FrozenLake-v1', gamma=0.99)`.",  # test_mends_of_the_facade
     "Wrap a function of observations in `irl_gym.agents.experts.Acting`.",  # test_mends_of_experts
     "Delete it, and it is written again.",  # test_vouched_files

@@ -12,7 +12,10 @@ demo: $(READY)  ## recover a reward on FrozenLake 8x8, retrain PPO on it, print 
 paper: $(READY)  ## reproduce the experiments of Ng & Russell (2000): numbers, verdicts, figures (about 6 minutes)
 	$(BIN)/irl-gym reproduce ng-russell-2000
 
-test: lint types unit wheel  ## everything CI checks
+# The types take one core for a minute: what else needs no second one is checked beside them.
+test: $(READY)  ## everything CI checks
+	$(MAKE) -j2 types lint wheel
+	$(MAKE) unit
 
 lint: $(READY)
 	$(BIN)/ruff format --check .
@@ -65,11 +68,12 @@ versions:  ## are there wheels of all dependencies for each Python?
 	for one in $(PYTHONS); do $(LOWEST)/bin/uv pip compile --quiet --python-version $$one --only-binary :all: --all-extras pyproject.toml \
 		> /dev/null || exit 1; echo "Python $$one: wheels of every dependency"; done
 
-# torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA.
+# torch first and by its pinned version: any other way of asking for it may fetch gigabytes of CUDA. Not compiled: most of what
+# these packages hold is never imported.
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt torch
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt torch
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
 clean:

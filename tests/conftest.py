@@ -2,14 +2,14 @@
 
 import shutil
 
-import jaxtyping
+import typechecker
 
-jaxtyping.install_import_hook("irl_gym", "typechecker.check")
+typechecker.install()
 
 import gymnasium as gym  # noqa: E402  (nothing of irl_gym may be imported before the hook)
 import hypothesis  # noqa: E402
+import jaxtyping  # noqa: E402
 import pytest  # noqa: E402
-import typechecker  # noqa: E402
 
 for profile, examples in (("irl_gym", 15), ("thorough", 100)):  # the second by `make bars`
     hypothesis.settings.register_profile(profile, deadline=None, derandomize=True, max_examples=examples, database=None)
@@ -70,6 +70,16 @@ def unchecked():
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
+@pytest.fixture(scope="module")
+def without_figures():
+    """The runs of these tests draw none, which take the time."""
+    from irl_gym.loop.loop import MAKERS
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(MAKERS, "figures", ())
+        yield
+
+
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory):
     """The folder of the finished run of `lake_run`, which is copied before it is changed."""
@@ -84,9 +94,10 @@ def finished(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def policy_run(tmp_path_factory):
-    """Gives the folder of a finished run of `lake_run.of_policies`; each is made once."""
+    """Gives the folder of a finished run of `lake_run.of_policies`, without figures; each is made once."""
     from lake_run import of_policies
 
+    from irl_gym.loop.loop import MAKERS
     from irl_gym.loop.pipeline import recover_and_retrain
 
     made = {}
@@ -94,7 +105,9 @@ def policy_run(tmp_path_factory):
     def get(name, seed=0):
         if (name, seed) not in made:
             made[name, seed] = tmp_path_factory.mktemp("runs") / f"{name}-{seed}"
-            recover_and_retrain(of_policies(name, seed), made[name, seed])
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setitem(MAKERS, "figures", ())
+                recover_and_retrain(of_policies(name, seed), made[name, seed])
         return made[name, seed]
 
     return get

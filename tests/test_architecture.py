@@ -1,6 +1,7 @@
 """docs/architecture.md says what is the case: the picture is that of the imports, and every file that it names is there."""
 
 import ast
+import functools
 import importlib.metadata
 import re
 import runpy
@@ -27,6 +28,7 @@ AT_HOME = {
 """Who may ask what kind of learner or world something is."""
 
 
+@functools.cache
 def modules():
     """Each module of the library with its syntax."""
     return {one.relative_to(ROOT / "irl_gym"): ast.parse(one.read_text()) for one in (ROOT / "irl_gym").rglob("*.py")}

@@ -26,7 +26,7 @@ from irl_gym.features.linear_reward import LinearReward
 from irl_gym.files.archives import read_arrays
 from irl_gym.judging.ambiguity.lambda_path import LambdaPath
 from irl_gym.mdp.episodes import Episode
-from irl_gym.runs.experiment import parse_keywords
+from irl_gym.runs.choices import parse_keywords
 from irl_gym.tables.enumeration.explored import load_explored
 
 INTO = {"space": spaces.Discrete(16), "n_actions": 4}

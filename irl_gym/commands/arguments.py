@@ -186,7 +186,8 @@ class Arguments:
 
         from irl_gym.agents.expert_files import FromFile
         from irl_gym.learners.registry import learner_of
-        from irl_gym.runs.experiment import Experiment, parse_keywords
+        from irl_gym.runs.choices import parse_keywords
+        from irl_gym.runs.experiment import Experiment
         from irl_gym.runs.named_parts import environment_of, planner_named, steps_only
 
         given, shown = self.environment, self.demonstrations

@@ -122,7 +122,7 @@ def exported(arguments: Arguments) -> tuple[Any, str | None]:
     from irl_gym.demonstrations.datasets import described
     from irl_gym.demonstrations.export import Amount, export_dataset
     from irl_gym.demonstrations.minari_files import unkept
-    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.choices import parse_keywords
     from irl_gym.runs.named_parts import environment_of
 
     amount = Amount(1_000 if arguments.episodes is None and arguments.steps is None else arguments.episodes, arguments.steps)

@@ -81,7 +81,7 @@ class Learning:
         Raises:
             InvalidParameter: one is given twice, or is no option's value.
         """
-        from irl_gym.runs.experiment import parse_keywords
+        from irl_gym.runs.choices import parse_keywords
 
         found = parse_keywords(self.options, "options")
         if self.time_limit is not None and "time_limit" in found:

@@ -101,7 +101,7 @@ def be_asked(asked: Arguments) -> int:
     from irl_gym.commands.demonstrating.keyboard import controls_of
     from irl_gym.commands.demonstrating.playing import stage
     from irl_gym.commands.demonstrating.screens import terminal_keys, window_keys
-    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.choices import parse_keywords
 
     given = parse_keywords(asked.env_kwargs)
     plain, shown = stage(asked.env_id, given, asked.mode)
@@ -131,7 +131,7 @@ def main(asked: Arguments) -> int:
     from irl_gym.commands.demonstrating.keyboard import controls_of
     from irl_gym.commands.demonstrating.playing import Play, free_dataset, learn_command, stage, write_played
     from irl_gym.demonstrations.minari_files import unkept
-    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.choices import parse_keywords
 
     code = 0
     if asked.mode == "terminal":

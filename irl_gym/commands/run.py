@@ -136,7 +136,7 @@ def _kept(arguments: Arguments, shared: Path) -> "tuple[Experiment, Path]":
     """The experiment and its folder; a file is made a dataset there, unless it was before."""
     from irl_gym.files.own_files import held
     from irl_gym.files.run_folder import RunFolder
-    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.choices import parse_keywords
     from irl_gym.runs.identity import claim
     from irl_gym.runs.named_parts import environment_of
 

@@ -75,7 +75,7 @@ def tabulated(arguments: Arguments, tell: Callable[[float | None, str], None]) -
     """
     from irl_gym.errors import HiddenState
     from irl_gym.loop.world_choice import ON_COMMAND_LINE, telling
-    from irl_gym.runs.experiment import parse_keywords
+    from irl_gym.runs.choices import parse_keywords
     from irl_gym.runs.named_parts import environment_of
     from irl_gym.tables.discretize import discretize
     from irl_gym.tables.enumeration.table import Enumeration

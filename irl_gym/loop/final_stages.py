@@ -111,13 +111,15 @@ def feasible_set(folder: Path, learner: Learner, mdp: Any, known_expert: Any, ce
     return told
 
 
-def _too_much(learner: Any, mdp: TabularMDP) -> str | None:
+def _too_much(learner: Any, mdp: TabularMDP | None) -> str | None:
     """Why the feasible set is not examined; None where it is."""
     if not getattr(learner, "of_feasible_set", False):
         return f"{type(learner).__name__} does not say that its reward is one of the feasible set"
     for name, what in (("r_max", "the bound on its rewards"), ("reward_on", '"state" or "state-action"')):
         if not hasattr(learner, name):
             return f"{type(learner).__name__} says that its reward is one of the feasible set, and has no {name}, {what}"
+    if mdp is None:
+        return "there is no table to work it out on"
     n = int((mdp.reachable & ~mdp.terminal).sum())
     steps = n * mdp.n_actions if learner.reward_on == "state-action" else 0
     if n > MOST_STATES:

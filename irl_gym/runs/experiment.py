@@ -224,32 +224,3 @@ def _digest(value: Any) -> str | None:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
-
-
-def parse_keywords(parts: Sequence[str], what: str = "env-kwargs") -> dict[str, Any]:
-    """Arguments of an environment given as text: `name=value` pairs, each value json or plain text; or one json object.
-
-    `Infinity` and `NaN` are floats, as in Python's json: a bound may be infinite.
-
-    Raises:
-        InvalidParameter: neither, or a name twice.
-    """
-    if len(parts) == 1 and parts[0].lstrip().startswith("{"):
-        try:
-            return json.loads(parts[0])
-        except (ValueError, RecursionError) as error:
-            raise InvalidParameter(f"{what} is {parts[0]!r:.200}, not json ({error}): expected an object.") from error
-    found: dict[str, Any] = {}
-    for part in parts:
-        name, equals, text = part.partition("=")
-        if not equals or not name.isidentifier():
-            raise InvalidParameter(f"{what} has {part!r}: expected name=value, such as map_name=8x8.")
-        if name in found:
-            raise InvalidParameter(f"{what} has {part!r} after {name}={found[name]!r}: expected each name once. Leave one out.")
-        try:
-            found[name] = json.loads(text)
-        except ValueError:
-            found[name] = text
-        except RecursionError as error:
-            raise InvalidParameter(f"{what} has {part!r:.40}, nested too deeply: expected plain json, or text.") from error
-    return found

@@ -16,7 +16,23 @@ class Pond(FrozenLakeEnv):
     def __init__(self, render_mode=None):
         super().__init__(render_mode, desc=["SF", "HG"])
 
+class Fog(gym.Env):
+    observation_space, action_space = gym.spaces.Discrete(3), gym.spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.key, self.at = 0, 0
+        return self.at, {}
+
+    def step(self, action):
+        if action == 0:
+            self.key, self.at = 1, 1 - self.at
+        elif self.key and self.at == 0:
+            self.at = 2
+        return self.at, float(self.at == 2), self.at == 2, False, {}
+
 gym.register("Pond-v0", entry_point="own_env_here:Pond", max_episode_steps=50)
+gym.register("Fog-v0", entry_point="own_env_here:Fog", max_episode_steps=50)
 """,
     "own_learner_here": """
 from dataclasses import dataclass, replace
@@ -62,7 +78,8 @@ def here(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.setattr(sys, "modules", sys.modules)
     yield tmp_path
-    gymnasium.registry.pop("Pond-v0", None)
+    for name in ("Pond-v0", "Fog-v0"):
+        gymnasium.registry.pop(name, None)
     for name in MODULES:
         sys.modules.pop(name, None)
 

@@ -183,7 +183,7 @@ def test_the_module_ends_as_the_command_does(tmp_path):
     done = process("-m", "irl_gym", "run", "--env-id", "FrozenLake-v1", *FEW, cwd=tmp_path)
     assert done.returncode == 0 and "Under the true reward" in done.stdout
     assert all(STAGE.match(line) for line in done.stderr.splitlines())
-    assert process("-m", "irl_gym", "report", "--run", "nowhere", cwd=tmp_path).returncode == 2
+    assert process("-m", "irl_gym", "rnu", cwd=tmp_path).returncode == 2
 
 
 @pytest.mark.parametrize("what", ["env-id", "learner"])

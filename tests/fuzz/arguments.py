@@ -20,7 +20,8 @@ from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.tabular_mdp import TabularMDP
-from irl_gym.runs.experiment import Experiment, parse_keywords
+from irl_gym.runs.choices import parse_keywords
+from irl_gym.runs.experiment import Experiment
 from irl_gym.spaces.listed_states import ListedStates
 from irl_gym.spaces.states import StateIndex
 from irl_gym.tables.tabulate import make

@@ -80,6 +80,11 @@ def test_a_run_killed_in_a_late_stage_continues_with_it(finished, tmp_path, stag
     assert differing(finished, out) == []
 
 
+def test_the_feasible_set_of_a_learner_is_not_worked_out_when_there_is_no_table(tmp_path):
+    told = final_stages.feasible_set(tmp_path, FiniteLP(), None, None, {})
+    assert told == {"no_ambiguity": "there is no table to work it out on"}
+
+
 def test_a_path_with_more_pieces_than_are_kept_is_shown_and_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("irl_gym.loop.final_stages.MOST_PIECES", 3)
     out = run(tmp_path).out

@@ -184,11 +184,13 @@ def test_a_planner_on_the_recovered_reward_is_optimal(planned):
     assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_an_sb3_expert_can_demonstrate(tmp_path):
     made = recover_and_retrain(small(expert=SB3(total_timesteps=30_000), retrain=ValueIteration()), tmp_path)
     assert made.metrics["policies"]["retrained"]["value"] == pytest.approx(made.metrics["policies"]["expert"]["value"])
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_an_environment_that_pays_by_luck_is_stepped(tmp_path):
     made = recover_and_retrain(
         Experiment("CliffWalkingSlippery-v1", 0.99, episodes=5, eval_episodes=5, retrain=ValueIteration(),
@@ -197,6 +199,7 @@ def test_an_environment_that_pays_by_luck_is_stepped(tmp_path):
     assert made.metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_our_own_environments_work_by_module_and_id(tmp_path):
     asked = Experiment("irl_gym_envs:irl_gym/GridWorld-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration())
     assert recover_and_retrain(asked, tmp_path).metrics["policies"]["retrained"]["score"] == pytest.approx(1.0)

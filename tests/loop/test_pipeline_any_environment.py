@@ -87,7 +87,7 @@ NAMES = tuple(ASKED)
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def runs(without_figures, tmp_path_factory):
     """Reports by name, each made when it is asked for."""
     made = {}
 
@@ -211,7 +211,6 @@ import gymnasium as gym
 from gymnasium import spaces
 from irl_gym.tables.enumeration.table import Enumeration
 from irl_gym.runs.experiment import Experiment
-from irl_gym.files.own_files import LOCK, UNFINISHED
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.agents.planners import ValueIteration
 
@@ -224,7 +223,7 @@ class Counted(gym.Env):
         return (self.x, self.y), {}
     def step(self, action):
         Counted.steps += 1
-        if Counted.steps == int(sys.argv[2]):
+        if Counted.steps == dies_at:
             os.kill(os.getpid(), signal.SIGKILL)
         dx, dy = ((0, 1), (1, 0), (0, -1), (-1, 0))[action]
         self.x, self.y = min(max(self.x + dx, 0), 11), min(max(self.y + dy, 0), 11)
@@ -234,21 +233,26 @@ class Counted(gym.Env):
 gym.register("Counted-v0", entry_point=Counted, max_episode_steps=150)
 asked = Experiment("Counted-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration(), table=Enumeration(every=0))
 told = []
-recover_and_retrain(asked, sys.argv[1], lambda *one: told.append(one))
-print(told[1][2])
+recover_and_retrain(asked, out, lambda *one: told.append(one))
 """
 
 
-def test_an_enumeration_that_was_killed_continues_and_ends_in_the_same_bytes(tmp_path):
-    def start(out, dies_at=0):
-        command = [sys.executable, "-c", KILLED, str(tmp_path / out), str(dies_at)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], timeout=HANG)
+def test_an_enumeration_that_was_killed_continues_and_ends_in_the_same_bytes(without_figures, unchecked, tmp_path):
+    def given(out, dies_at=0):
+        return {"__name__": "killed", "out": str(tmp_path / out), "dies_at": dies_at}
 
-    killed, half = start("killed", 8_000), tmp_path / "killed" / ".enumeration.tmp.npz"
+    def start(out):
+        exec(KILLED, here := given(out))
+        del gym.registry["Counted-v0"]
+        return [int(one) for one in re.findall(r"\d+", here["told"][1][2])]
+
+    half = tmp_path / "killed" / ".enumeration.tmp.npz"
+    code = f"exec({KILLED!r}, {given('killed', 8_000)!r})"
+    killed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=HANG)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     left = {path.name for path in (tmp_path / "killed").iterdir() if not UNFINISHED.fullmatch(path.name)}
     assert left == {half.name, LOCK}  # the system has let go of the lock
-    killed, fresh = ([int(one) for one in re.findall(r"\d+", start(out).stdout)] for out in ("killed", "fresh"))
+    killed, fresh = start("killed"), start("fresh")
     assert killed[0] == killed[1] and fresh[0] > fresh[1]  # states found, and tried, as they were first told
     for name in ("metrics.json", "certificate.json", "reward.npz", "config.json"):
         first, second = ((tmp_path / out / name).read_bytes() for out in ("killed", "fresh"))

@@ -17,7 +17,7 @@ from irl_gym.errors import DatasetMismatch, InvalidParameter, RunConflict
 from irl_gym.files.run_folder import read_json
 from irl_gym.judging.metrics import policy_value
 from irl_gym.learners.linear_programs.finite import FiniteLP
-from irl_gym.loop.loop import MAKERS, Loop
+from irl_gym.loop.loop import Loop
 from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.loop.worlds import discounted_mean
 from irl_gym.mdp.episodes import Episode, empirical_policy
@@ -35,12 +35,7 @@ FEW = {"eval_episodes": 400, "retrain": ValueIteration()}
 LAKE = {"map_name": "4x4", "max_episode_steps": LIMIT}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def no_figures():
-    """They take longer than all else here; other tests draw them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(MAKERS, "figures", ())
-        yield
+pytestmark = pytest.mark.usefixtures("without_figures")
 
 
 def recorded(out, **asked):

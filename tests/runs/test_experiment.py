@@ -13,7 +13,8 @@ from irl_gym.features.feature_maps import Functions, OneHot, Table, Unravel
 from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.linear_programs.trajectory import TrajectoryLP
-from irl_gym.runs.experiment import MOST_LISTED, Experiment, parse_keywords
+from irl_gym.runs.choices import parse_keywords
+from irl_gym.runs.experiment import MOST_LISTED, Experiment
 from irl_gym.tables.counted.counting import Counting, Interaction
 from irl_gym.tables.enumeration.table import Enumeration
 

@@ -20,6 +20,7 @@ from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.films import load_film
 
 QUICK = {"episodes": 5, "eval_episodes": 5}
+pytestmark = pytest.mark.usefixtures("without_figures")
 
 
 class Line(gym.Env):

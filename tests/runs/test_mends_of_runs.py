@@ -26,7 +26,8 @@ from irl_gym.loop.pipeline import recover_and_retrain
 from irl_gym.loop.table_world import TableWorld
 from irl_gym.loop.world_choice import place_of
 from irl_gym.loop.worlds import SteppedWorld
-from irl_gym.runs.experiment import Experiment, parse_keywords
+from irl_gym.runs.choices import parse_keywords
+from irl_gym.runs.experiment import Experiment
 from irl_gym.runs.identity import NEW_FOLDER, claim
 from irl_gym.runs.run import read_run
 from irl_gym.tables.counted.counting import Interaction

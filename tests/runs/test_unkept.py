@@ -69,7 +69,7 @@ def registered():
 
 
 @pytest.fixture(scope="module")
-def filled(registered, tmp_path_factory):
+def filled(registered, without_figures, tmp_path_factory):
     """A run of an environment that was registered with an array and an object."""
     return recover_and_retrain(Experiment("Filled-v0", 0.9, **FEW), tmp_path_factory.mktemp("runs") / "filled")
 

@@ -1,5 +1,6 @@
 """Scripts as a person runs them, by subprocess, and a run that several tests only read."""
 
+import io
 import runpy
 import subprocess
 import sys
@@ -28,8 +29,9 @@ def process():
 def called(capsys, monkeypatch, unchecked):
     """A script called in this process with a command line: what it returns and says, without another start of Python."""
 
-    def call(path, *arguments, cwd):
+    def call(path, *arguments, cwd, typed=""):
         monkeypatch.chdir(cwd)
+        monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
         monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
         monkeypatch.setattr(sys, "path", [*sys.path])  # where they stand is added
         with pytest.raises(SystemExit) as ended:

@@ -23,7 +23,7 @@ from irl_gym.runs.supply import supplied
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def runs(without_figures, tmp_path_factory):
     """Finished runs: a healthy one, one of the paper's own program, one of an expert with noise."""
     folder = tmp_path_factory.mktemp("runs")
     plain = {"env_id": "FrozenLake-v1", "gamma": 0.99, "retrain": ValueIteration(), "episodes": 30, "eval_episodes": 5}

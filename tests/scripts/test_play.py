@@ -34,6 +34,12 @@ def piped(keys, *arguments, cwd, **variables):
     )
 
 
+@pytest.fixture
+def played(script, tmp_path):
+    """The script called in this process, where its input is no terminal."""
+    return lambda keys, *arguments: script("play", "--root", "data", *arguments, cwd=tmp_path, typed=keys)
+
+
 def kept(cwd, monkeypatch, dataset_id):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(cwd / "data"))
     return list(minari.load_dataset(dataset_id).iterate_episodes())
@@ -47,8 +53,8 @@ def test_piped_keys_become_a_dataset_that_minari_opens(tmp_path, monkeypatch):
     assert [bool(one.terminations[-1]) for one in episodes] == [True, True]
 
 
-def test_the_script_says_what_happened_and_how_to_learn_from_it(tmp_path, capsys, monkeypatch, unchecked):
-    made = piped(WON, *LAKE, "--episodes", "1", cwd=tmp_path)
+def test_the_script_says_what_happened_and_how_to_learn_from_it(tmp_path, capsys, monkeypatch, played):
+    made = played(WON, *LAKE, "--episodes", "1")
     assert "Episode 1: return 1 in 6 steps, it ended." in made.stdout and "\x1b" not in made.stdout and made.stderr == ""
     assert made.stdout.endswith("    irl-gym run --dataset irl_gym/frozenlake-v1-played-v0 --dataset-root data\n")
     monkeypatch.setitem(loop.MAKERS, "figures", ())  # which take the time
@@ -57,21 +63,21 @@ def test_the_script_says_what_happened_and_how_to_learn_from_it(tmp_path, capsys
     assert main([*words, "--retrain", "value-iteration"]) == 0 and "The recovered reward" in capsys.readouterr().out
 
 
-def test_the_end_of_the_input_keeps_what_was_finished(tmp_path, monkeypatch):
-    made = piped(WON + "dd\n", *LAKE, cwd=tmp_path)
+def test_the_end_of_the_input_keeps_what_was_finished(tmp_path, monkeypatch, played):
+    made = played(WON + "dd\n", *LAKE)
     assert made.returncode == 0 and "The unfinished episode of 2 steps is discarded." in made.stdout
     assert len(kept(tmp_path, monkeypatch, "irl_gym/frozenlake-v1-played-v0")) == 1
 
 
-def test_an_unfinished_episode_is_kept_where_asked(tmp_path, monkeypatch):
-    made = piped("ddq", *LAKE, "--keep-unfinished", cwd=tmp_path)
+def test_an_unfinished_episode_is_kept_where_asked(tmp_path, monkeypatch, played):
+    made = played("ddq", *LAKE, "--keep-unfinished")
     assert made.returncode == 0, made.stderr
     (episode,) = kept(tmp_path, monkeypatch, "irl_gym/frozenlake-v1-played-v0")
     assert episode.truncations.tolist() == [False, True] and not episode.terminations.any()
 
 
-def test_nothing_played_leaves_no_dataset(tmp_path):
-    made = piped("ddq", *LAKE, cwd=tmp_path)
+def test_nothing_played_leaves_no_dataset(tmp_path, played):
+    made = played("ddq", *LAKE)
     assert made.returncode == 1 and "No episode was finished" in made.stdout and not list((tmp_path / "data").iterdir())
 
 
@@ -116,10 +122,17 @@ def test_pictures_in_a_terminal_need_no_display(tmp_path, monkeypatch):
     assert made.returncode == 1 and made.stderr == ""
 
 
-def test_a_taken_id_is_refused_before_playing(tmp_path):
+def test_playing_imports_no_torch(tmp_path):
+    code = f"import sys; from irl_gym.commands.door import main; main({['play', *LAKE, '--episodes', '1', '--root', '.']!r})"
+    command = [sys.executable, "-c", f"{code}; print('torch' in sys.modules)"]
+    made = subprocess.run(command, cwd=tmp_path, input=WON, capture_output=True, text=True, timeout=HANG)
+    assert "is written" in made.stdout and made.stdout.endswith("\nFalse\n"), made.stderr
+
+
+def test_a_taken_id_is_refused_before_playing(played):
     asked = (*LAKE, "--episodes", "1", "--dataset-id", "me/lake-v0")
-    assert piped(WON, *asked, cwd=tmp_path).returncode == 0
-    made = piped(WON, *asked, cwd=tmp_path)
+    assert played(WON, *asked).returncode == 0
+    made = played(WON, *asked)
     assert made.returncode == 2 and "DatasetExists" in made.stderr and made.stdout == ""
 
 

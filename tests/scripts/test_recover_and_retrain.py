@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands.conftest import MODULES
 from stopped import HANG, run_until
 
 from irl_gym.commands import run as run_command
@@ -66,10 +67,11 @@ def test_a_run_keeps_the_arguments_it_was_given(finished):
     assert json.loads(kept.read_text())["command"] == wanted
 
 
-def test_each_experiment_gets_a_folder_of_its_own(finished):
+@pytest.mark.usefixtures("without_figures")
+def test_each_experiment_gets_a_folder_of_its_own(finished, called):
     _, cwd = finished
     assert len(list((cwd / "runs").iterdir())) == 1
-    run(*QUICK, "--retrain", "value-iteration", cwd=cwd)
+    called(SCRIPT, *QUICK, "--retrain", "value-iteration", cwd=cwd)
     assert len(list((cwd / "runs").iterdir())) == 2
 
 
@@ -99,8 +101,9 @@ def test_a_mistake_gets_one_clear_line(tmp_path, called, arguments, says):
 
 
 def test_a_mistake_in_a_process_of_its_own_gets_one_clear_line(tmp_path):
-    made = run("--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--reveal", "none", cwd=tmp_path)
-    assert made.returncode == 2 and "HiddenState: no table of Taxi-v4: observation" in made.stderr
+    (tmp_path / "own_env_here.py").write_text(MODULES["own_env_here"])
+    made = run("--env-id", "own_env_here:Fog-v0", cwd=tmp_path)
+    assert made.returncode == 2 and "HiddenState: no table of own_env_here:Fog-v0: observation" in made.stderr
     assert "Traceback" not in made.stderr
 
 
@@ -109,23 +112,28 @@ def test_help_names_the_learners(tmp_path, called):
     assert all(name in text for name in ("finite-lp", "feature-lp", "trajectory-lp", "--slack", "--dataset", "--bins"))
 
 
-def test_the_report_names_the_best_round_of_trajectories(tmp_path):
-    made = run("--episodes", "10", "--retrain", "value-iteration", "--learner", "trajectory-lp", "--rounds", "2", cwd=tmp_path)
+@pytest.mark.usefixtures("without_figures")
+def test_the_report_names_the_best_round_of_trajectories(tmp_path, called):
+    words = ("--episodes", "10", "--retrain", "value-iteration", "--learner", "trajectory-lp", "--rounds", "2")
+    made = called(SCRIPT, *words, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert all(word in made.stdout for word in ("best round", "distance", "cut after"))
 
 
-def test_a_dataset_alone_is_learned_from(finished, tmp_path):
+@pytest.mark.usefixtures("without_figures")
+def test_a_dataset_alone_is_learned_from(finished, tmp_path, called):
     (held,) = sorted((finished[1] / "runs").iterdir())[:1]
     data = ("--dataset", "irl_gym/frozenlake-v1-expert-v0", "--dataset-root", str(held / "dataset"))
-    made = run(*data, "--retrain", "value-iteration", cwd=tmp_path)
+    made = called(SCRIPT, *data, "--retrain", "value-iteration", cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     said = " ".join(made.stdout.split())
     assert all(words in said for words in ("that of its episodes, paid by the table", "an optimal action", "table:"))
 
 
-def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs(tmp_path):
-    made = run(
+@pytest.mark.usefixtures("without_figures")
+def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs(tmp_path, called):
+    made = called(
+        SCRIPT,
         "--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--epsilon", "0.2", "--episodes", "60",
         "--retrain", "value-iteration", cwd=tmp_path,
     )  # fmt: skip
@@ -139,9 +147,9 @@ def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs
     assert found["reward"]["violated_states"] > 0 < found["reward"]["unknown_states"] and found["reward"]["slack"] == 1.0
 
 
-def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path):
+def test_a_folder_that_holds_another_run_is_refused(finished, tmp_path, called):
     (held,) = sorted((finished[1] / "runs").iterdir())[:1]
-    made = run("--out", str(held), "--seed", "7", cwd=tmp_path)
+    made = called(SCRIPT, "--out", str(held), "--seed", "7", cwd=tmp_path)
     assert made.returncode == 2 and "RunConflict" in made.stderr
 
 
@@ -166,13 +174,13 @@ def test_a_run_that_is_interrupted_says_how_to_go_on(tmp_path):
     assert made.returncode == 130 and made.stderr.splitlines()[-1].startswith("Stopped. The same command continues")
 
 
-def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path):
+def test_a_run_that_was_killed_continues_with_the_stages_that_were_left(tmp_path, called):
     arguments = ("--out", "run", "--episodes", "10", "--total-timesteps", "4096")
     made = run_until(SCRIPT, *arguments, where=AGENT, sent=signal.SIGKILL, cwd=tmp_path)
     assert made.returncode == -signal.SIGKILL, made.stderr
     kept = (tmp_path / "run" / "reward.npz").stat().st_mtime_ns
     assert not (tmp_path / "run" / "metrics.json").exists()
-    made = run(*arguments, cwd=tmp_path)
+    made = called(SCRIPT, *arguments, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "run" / "reward.npz").stat().st_mtime_ns == kept
 

@@ -165,6 +165,7 @@ def test_ties_are_kept_on_a_table_counted_in_demonstrations():
     assert compare(found.mdp, expert).trivial[structural].all()
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_run_on_counts_says_what_its_agent_loses_at_most(tmp_path):
     asked = Experiment(
         "Inventory-v0", 0.95, table=Interaction(20_000), learner=FiniteLP(reward_on="state-action"), retrain=ValueIteration(),

@@ -23,6 +23,8 @@ ROUNDS = 80
 """Newton steps at most; about 15 are usual."""
 CLOSE = 1e-11
 """mu at which to stop."""
+NO_WEIGHT = 1e-9
+"""A weight below this is 0: one action in so many steps would have more."""
 WEIGHED = 1e-4
 """An action may have weight in some optimum unless 1 - g_a is above this."""
 INDEPENDENT = 1e-7
@@ -88,6 +90,7 @@ def _solved(L: np.ndarray, q: np.ndarray, begins: np.ndarray) -> tuple[np.ndarra
         dw = np.linalg.solve(H, (aim / w - (1 - g))[:, :, None])[:, :, 0]
         dz = (aim - z * dw) / w - z
         w, z = w + _inside(w, dw) * dw, z + _inside(z, dz) * dz
+    w = np.where(w > NO_WEIGHT, w, 0.0)  # an interior point leaves every weight above 0
     w = w / w.sum(axis=1, keepdims=True)
     ratio, g = towards(w)
     return w, np.log(np.maximum(g.max(axis=1), 1.0)), _settled(curved(ratio), (w > WEIGHED) | (1 - g < WEIGHED))

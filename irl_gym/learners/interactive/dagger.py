@@ -211,7 +211,8 @@ class DAgger:
         env = stage if stage is not None else self._steppable(known) if mdp is None else None
         oracle = known.oracle if folder is None else Noted(known.oracle, Path(folder))
         labels = Labels(oracle, states, A, self.ask, gated=self.labels == "gated")
-        policy = chance = clones.first()
+        policy: Any = clones.first()
+        chance = policy
         try:
             for number in range(1, self.rounds + 1):
                 beta = self.share(number)

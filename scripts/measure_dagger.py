@@ -56,7 +56,7 @@ class World:
         """Whose expert can be asked."""
         policy = TabularPolicy(as_distribution(self.expert, self.mdp.n_states, self.mdp.n_actions), self.states)
         spaces = Spaces(self.states.space, gym.spaces.Discrete(self.mdp.n_actions), self.states)
-        return Problem(spaces, oracle=Oracle(policy), dynamics=self.mdp)
+        return Problem(spaces, oracle=Oracle(policy), dynamics=self.mdp, reward=self.reward)
 
     def score(self, policy: np.ndarray) -> float:
         """Between random and expert, exactly."""
@@ -89,9 +89,9 @@ def tightrope(length: int = 20, n_actions: int = 5) -> World:
     return World(mdp, TabularReward(paid), expert, StateIndex(gym.spaces.Discrete(S)), classes)
 
 
-def by_dagger(world: World, learner: Any, seed: int, ask: Any = "always", episodes: int = 1) -> Iterator[tuple[int, float]]:
-    """What the last policy is worth, an episode a round."""
-    asking = DAgger(rounds=10_000, learner=learner, episodes=episodes, max_episode_steps=LONGEST, ask=ask)
+def by_dagger(world: World, learner: Any, seed: int, episodes: int = 1, **options: Any) -> Iterator[tuple[int, float]]:
+    """What the last policy is worth, after each round."""
+    asking = DAgger(rounds=10_000, learner=learner, episodes=episodes, max_episode_steps=LONGEST, **options)
     for one in asking.iterate(world.problem(), np.random.default_rng(seed)):
         yield one.queries, world.score(one.policy)
 
@@ -100,7 +100,8 @@ def by_cloning(world: World, learner: Any, seed: int, episodes: int = 1) -> Iter
     """The same, of the expert's own episodes."""
     mdp, rng, problem = world.mdp, np.random.default_rng(seed), world.problem()
     weights, assured = np.zeros((mdp.n_states, mdp.n_actions)), np.full((mdp.n_states, mdp.n_actions), 1 / mdp.n_actions)
-    labels = Labels(problem.oracle, world.states, mdp.n_actions, "always")
+    oracle: Any = problem.oracle
+    labels = Labels(oracle, world.states, mdp.n_actions, "always")
     while True:
         weights += drawn_visits(mdp, assured, 1.0, labels, episodes, LONGEST, rng).aggregated(weights.shape)
         policy = np.asarray(learner.fit(weights, mdp, states=world.states).policy)
@@ -122,11 +123,21 @@ def at(curve: Curve, labels: int) -> float:
     return next((value for n, value in reversed(curve) if n <= labels), 0.0)
 
 
-def limits(world: World, learner: Any, rounds: int = 30) -> tuple[float, float, float]:
-    """Of infinitely many labels: of the clone, and of the last and the best policy of DAgger in the exact mode."""
-    clone = learner.fit(occupancy(world.mdp, world.expert), world.mdp, states=world.states).policy
-    each = [world.score(one.policy) for one in DAgger(rounds, learner).iterate(world.problem(), np.random.default_rng(0))]
-    return world.score(np.asarray(clone)), each[-1], max(each)
+def kept(curve: Curve) -> Curve:
+    """What DAgger keeps where the table and the reward are known: the best policy so far."""
+    values = np.maximum.accumulate([value for _, value in curve])
+    return [(labels, float(value)) for (labels, _), value in zip(curve, values, strict=True)]
+
+
+def limit(world: World, learner: Any, rounds: int = 30, **options: Any) -> list[float]:
+    """Of infinitely many labels: what the policy of each round of DAgger is worth in the exact mode."""
+    asking = DAgger(rounds, learner, **options)
+    return [world.score(one.policy) for one in asking.iterate(world.problem(), np.random.default_rng(0))]
+
+
+def told(curves: list[Curve]) -> list[str]:
+    """The mean at each number of labels."""
+    return [f"{np.mean([at(one, labels) for one in curves]):.3f}" for labels in AT]
 
 
 def labels_to(curve: Iterator[tuple[int, float]], value: float) -> int:
@@ -134,20 +145,20 @@ def labels_to(curve: Iterator[tuple[int, float]], value: float) -> int:
     return next(labels for labels, found in curve if found >= value)
 
 
-def draw(curves: dict[str, dict[str, list[Curve]]], ends: dict[str, tuple[float, float, float]], path: Path) -> None:
-    """The curves, means over seeds, and the clone's limit."""
+def draw(curves: dict[str, dict[str, list[Curve]]], ends: dict[str, float], path: Path) -> None:
+    """The curves, means over seeds, and the clone's limits."""
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(1, len(curves), figsize=(4 * len(curves), 3.4), constrained_layout=True, sharey=True)
     grid = np.unique(np.geomspace(AT[0], AT[-1], 40).astype(int))
     for axis, (title, each) in zip(axes, curves.items(), strict=True):
-        for (name, seeds), colour in zip(each.items(), ("C0", "C1"), strict=True):
+        for (name, seeds), colour in zip(each.items(), ("C0", "C2", "C1"), strict=True):
             values = np.array([[at(one, n) for n in grid] for one in seeds])
             axis.plot(grid, values.mean(axis=0), color=colour, label=name)
             axis.fill_between(grid, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.15, linewidth=0)
-        axis.axhline(ends[title][0], color="C1", linestyle=":", label="cloning's limit")
-        axis.set(title=title, xscale="log", xlabel="labels")
+        axis.axhline(ends[title], color="C1", linestyle=":", label="cloning's limit")
+        axis.set(title=title.replace(", ", "\n"), xscale="log", xlabel="labels")
     axes[0].set_ylabel("exact value (expert 1, random 0)")
     axes[0].legend(loc="lower right", fontsize="small")
     figure.savefig(path, dpi=110, metadata={"Software": None})
@@ -164,21 +175,26 @@ def main(seeds: int = 4, full_seeds: int = 8, figure: Path = FIGURE) -> None:
     """
     worlds = {"FrozenLake 8x8": lake(), "tightrope": tightrope()}
     curves: dict[str, dict[str, list[Curve]]] = {}
-    ends: dict[str, tuple[float, float, float]] = {}
+    ends: dict[str, float] = {}
     rows = []
     for name, world in worlds.items():
         for kind, learner in world.classes.items():
-            title = f"{name}, {kind}"
-            n = 2 if isinstance(learner, SoftmaxClone) else 1
-            made = {
-                "DAgger": partial(by_dagger, world, learner, episodes=n),
-                "cloning": partial(by_cloning, world, learner, episodes=n),
-            }
-            curves[title] = {how: [until(curve(seed), AT[-1]) for seed in range(seeds)] for how, curve in made.items()}
-            ends[title] = limits(world, learner)
-            for how, each in curves[title].items():
-                limit = f"{ends[title][0]:.3f}" if how == "cloning" else f"{ends[title][1]:.3f} (best {ends[title][2]:.3f})"
-                rows.append([title, how, *(f"{np.mean([at(one, labels) for one in each]):.3f}" for labels in AT), limit])
+            title, n = f"{name}, {kind}", 2 if isinstance(learner, SoftmaxClone) else 1
+
+            def seen(curve: Any, **options: Any) -> list[Curve]:
+                return [until(curve(seed=seed, **options), AT[-1]) for seed in range(seeds)]
+
+            given: dict[str, Any] = {"world": world, "learner": learner, "episodes": n}
+            last = {cost: seen(by_dagger, **given, cost=cost) for cost in ("mistakes", "advantage")}
+            found = {f"DAgger, {cost}": [*map(kept, each)] for cost, each in last.items()}
+            curves[title] = {**found, "cloning": seen(by_cloning, **given)}
+            clone = learner.fit(occupancy(world.mdp, world.expert), world.mdp, states=world.states).policy
+            ends[title] = world.score(np.asarray(clone))
+            for cost, each in last.items():
+                value = limit(world, learner, cost=cost)
+                for how, some, end in (("last", each, value[-1]), ("kept", found[f"DAgger, {cost}"], max(value))):
+                    rows.append([title, f"DAgger, {cost}, {how}", *told(some), f"{end:.3f}"])
+            rows.append([title, "cloning", *told(curves[title]["cloning"]), f"{ends[title]:.3f}"])
     print_table(f"Value by labels, means of {seeds} seeds", ["world, class", "by", *(f"{n:,}" for n in AT), "limit"], rows)
     draw(curves, ends, figure)
     world, rows = worlds["FrozenLake 8x8"], []

@@ -97,7 +97,7 @@ def play_on(play: "Play", mode: str) -> None:
 
 def be_asked(asked: Arguments) -> int:
     """Answer a learner's questions, and say what it learned."""
-    from irl_gym.commands.demonstrating.asking import Asking, Left, Person, answers_in
+    from irl_gym.commands.demonstrating.asking import Questions, Left, Person, answers_in
     from irl_gym.commands.demonstrating.keyboard import controls_of
     from irl_gym.commands.demonstrating.playing import stage
     from irl_gym.commands.demonstrating.screens import terminal_keys, window_keys
@@ -105,7 +105,7 @@ def be_asked(asked: Arguments) -> int:
 
     given = parse_keywords(asked.env_kwargs)
     plain, shown = stage(asked.env_id, given, asked.mode)
-    task = Asking(asked.env_id, given, asked.rounds, asked.episodes, asked.labels, asked.seed)
+    task = Questions(asked.env_id, given, asked.rounds, asked.episodes, asked.labels, asked.seed)
     out = task.folder if asked.out is None else Path(asked.out)
     for ending in ENDINGS:
         signal.signal(ending, signal.default_int_handler)

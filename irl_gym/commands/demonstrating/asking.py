@@ -94,7 +94,7 @@ class Person:
 
 
 @dataclass(frozen=True)
-class Asking:
+class Questions:
     """What is asked of a person."""
 
     env_id: str

@@ -1,7 +1,7 @@
 """The classes of policies that labels are cloned in: of numbered states, or of observations, by a network.
 
-    of rows    `fit(weights, table)` of `Clone`, `SoftmaxClone`; a policy is (S, A); `fit_costs` where mistakes have prices
-    seen       `fit_labels(observations, labels, spaces)` of `NeuralClone`; a policy has `predict`, and acts deterministically
+    of rows           `fit(weights, table)` of `Clone`, `SoftmaxClone`; a policy is (S, A); `fit_costs` where mistakes have prices
+    of observations   `fit_labels(observations, labels, spaces)` of `NeuralClone`; a policy has `predict`, and is deterministic
 Axes: S states, A actions.
 """
 
@@ -81,7 +81,7 @@ class OfRows:
 
 
 @dataclass(eq=False)
-class Seen:
+class OfObservations:
     """Policies of observations: None before anything was learned, which acts at random."""
 
     learner: Any
@@ -135,7 +135,7 @@ class Seen:
         return float(np.concatenate(other).mean())
 
 
-PolicyClass = OfRows | Seen
+PolicyClass = OfRows | OfObservations
 
 
 def check_clones(learner: Any, *, priced: bool, sampled: bool) -> None:

@@ -30,7 +30,7 @@ from irl_gym.errors import InvalidParameter, NotDiscrete, a_type
 from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.interactive.answers import Noted
-from irl_gym.learners.interactive.classes import OfRows, PolicyClass, Seen, check_clones
+from irl_gym.learners.interactive.classes import OfRows, PolicyClass, OfObservations, check_clones
 from irl_gym.learners.interactive.labels import Asking, Labels
 from irl_gym.learners.interactive.prices import prices
 from irl_gym.learners.interactive.proofs import DaggerProof
@@ -211,7 +211,8 @@ class DAgger:
         env = stage if stage is not None else self._steppable(known) if mdp is None else None
         oracle = known.oracle if folder is None else Noted(known.oracle, Path(folder))
         labels = Labels(oracle, states, A, self.ask, gated=self.labels == "gated")
-        policy = chance = clones.first()
+        policy: Any = clones.first()
+        chance = policy
         try:
             for number in range(1, self.rounds + 1):
                 beta = self.share(number)
@@ -259,7 +260,7 @@ class DAgger:
         self, known: Problem, mdp: TabularMDP | None, states: States | None, A: int, folder: Path | None
     ) -> PolicyClass:
         if not self.on_rows:
-            return Seen(self.learner, known.spaces, states, A, folder)
+            return OfObservations(self.learner, known.spaces, states, A, folder)
         assert states is not None
         learner: Any = featured(self.learner, known) if "features" in self.learner.needs.parts else self.learner
         priced = prices(known.oracle, mdp, known.reward) if self.cost == "advantage" else None

@@ -46,6 +46,8 @@ class LabelledEpisode(Episode):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.actions is None:
+            raise InvalidDemonstrations("actions are None: expected what was done at each step.")
         for name in ("labels", "asked"):
             if np.shape(getattr(self, name)) != (len(self),):
                 raise InvalidDemonstrations(

@@ -51,6 +51,7 @@ class LabelledVisits(Record):
 
     def aggregated(self, shape: tuple[int, int]) -> Matrix:
         """(S, A) the weight of each label."""
+        assert self.states is not None
         weights = np.zeros(shape)
         np.add.at(weights, (self.states, self.labels), self.weights)
         return weights

@@ -44,6 +44,7 @@ bars: $(READY)  ## the measured bars: slow tests, speed, memory, retraining on e
 	$(BIN)/python scripts/measure_learners.py
 	$(BIN)/python scripts/measure_state_only.py
 	$(BIN)/python scripts/measure_dagger.py
+	$(BIN)/python scripts/measure_cloning.py
 	$(BIN)/python scripts/measure_metrics.py
 	$(BIN)/python scripts/measure_ambiguity.py
 	$(BIN)/python scripts/reward_distances.py

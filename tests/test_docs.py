@@ -10,26 +10,30 @@ import functools
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import pytest
 from stopped import HANG
 
 from irl_gym.commands import door
+from irl_gym.learners.registry import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
     "../README", "python", "learners", "runs", "wrap-any-environment", "bring-your-own-demonstrations", "reward-distances",
-    "ambiguity", "doctor", "security",
+    "ambiguity", "doctor", "security", "imitation",
 )  # fmt: skip
 SCRIPTS = ("reward_distances.py", "measure_ambiguity.py")
 LEARNERS = ("finite-lp", "feature-lp", "trajectory-lp", "module:Class")
 HELP = f"""
 import contextlib, runpy, sys
 from irl_gym.commands import door
+from irl_gym.learners.registry import BUILT_IN
 for script in {SCRIPTS}:
     print("===", script, flush=True)
     sys.argv = [script, "--help"]
@@ -166,9 +170,22 @@ def test_links_lead_somewhere(name):
         assert (ROOT / "docs" / name).parent.joinpath(file).exists() if file else anchor in headings, target
 
 
-def test_the_table_of_learners_is_that_of_the_command(capsys):
+@pytest.mark.parametrize("name", ["../README", "imitation"])
+def test_the_table_of_learners_is_that_of_the_command(name, capsys):
     door.main(["learners", "--markdown"])
-    assert capsys.readouterr().out.strip() in page("../README")
+    assert capsys.readouterr().out.strip() in page(name)
+
+
+@pytest.mark.parametrize("name", ["feedback", "irl"])
+def test_the_figures_of_the_map_are_those_of_its_script(name):
+    drawn = runpy.run_path(str(ROOT / "scripts/draw_imitation.py"))[name]()
+    assert drawn == (ROOT / f"docs/figures/{name}.svg").read_text(encoding="utf-8"), "python scripts/draw_imitation.py"
+    ElementTree.fromstring(drawn)
+
+
+def test_every_learner_is_in_the_map_of_feedback():
+    drawn = (ROOT / "docs/figures/feedback.svg").read_text(encoding="utf-8")
+    assert {name for name in BUILT_IN if name not in drawn} == set()
 
 
 def test_the_readme_is_short():

@@ -38,13 +38,14 @@ class NeuralClone(FitsLabels):
     """
 
     net_arch: tuple[int, ...] | None = None
-    """Hidden layers; None for none where observations are numbers, which are one-hot, else SB3's own."""
+    """Hidden layers; None for none where observations are numbers, which are one-hot, else SB3's own. Images of 36 x 36 pixels
+    and more are read by SB3's convolutions first."""
     epochs: int = 100
     """Passes over the steps, at most."""
     batch_size: int = 128
     """Steps of a minibatch."""
     learning_rate: float | None = None
-    """Of Adam; None for 0.03 without hidden layers, else 0.001."""
+    """Of Adam; None for 0.03 without hidden layers or convolutions, else 0.001."""
     held_out: float = 0.1
     """Share of the episodes, between 0 and 1, by which training is stopped; of a single episode, of its steps; 0 for none."""
     patience: int = 10
@@ -75,7 +76,9 @@ class NeuralClone(FitsLabels):
 
         check_device(self.device)
 
-    def learn(self, problem: Problem, rng: np.random.Generator, on_epoch: Epoch | None = None) -> Outcome[None, NeuralProof]:
+    def learn(
+        self, problem: Problem, rng: np.random.Generator, on_epoch: Epoch | None = None, model: "PPO | None" = None
+    ) -> Outcome[None, NeuralProof]:
         """The same as `fit`, of a problem; where SB3 takes no such observations it is shown the rows of the table.
 
         Raises:
@@ -86,12 +89,12 @@ class NeuralClone(FitsLabels):
         episodes: Any = known.demonstrations
         parts = [take(one.observations, slice(None, -1)) for one in episodes]
         taken = [one.taken(f"episode {i}") for i, one in enumerate(episodes)]
-        return self.fit_labels(parts, taken, known.spaces, rng, on_epoch)
+        return self.fit_labels(parts, taken, known.spaces, rng, on_epoch, model)
 
     def fit(
         self, observations: Any, actions: Any, observation_space: spaces.Space, action_space: spaces.Space, *,
         lengths: Sequence[int] | None = None, rng: np.random.Generator | None = None, on_epoch: Epoch | None = None,
-        log: Path | None = None,
+        log: Path | None = None, model: "PPO | None" = None,
     ) -> Outcome[None, NeuralProof]:  # fmt: skip
         """Clone the steps of episodes.
 
@@ -104,6 +107,7 @@ class NeuralClone(FitsLabels):
             rng: of the first weights, of what is held out and of minibatches; None for seed 0.
             on_epoch: called after each epoch.
             log: folder for the losses as TensorBoard reads them; None for no log.
+            model: an agent of PPO or A2C whose policy becomes the clone, so that it goes on from there; None for a new one.
 
         Raises:
             InvalidDemonstrations: no step, parts of other lengths, or actions outside the space.
@@ -118,7 +122,7 @@ class NeuralClone(FitsLabels):
         each = np.array([len(taken)] if lengths is None else lengths)
         if each.sum() != len(taken):
             raise InvalidDemonstrations(f"the lengths add up to {each.sum()}: expected {len(taken)}, the number of steps.")
-        model = self._model(observation_space, action_space, rng)
+        model = self._model(observation_space, action_space, rng) if model is None else model
         with within(deadline):
             return trained(
                 model, observations, taken, self._out(each, rng), self._counts(taken, action_space),

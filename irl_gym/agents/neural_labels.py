@@ -17,6 +17,8 @@ from irl_gym.spaces.batches import by_part
 from irl_gym.spaces.states import States
 
 if TYPE_CHECKING:
+    from stable_baselines3 import PPO
+
     from irl_gym.agents.planners import Agent
 
 
@@ -28,7 +30,7 @@ class FitsLabels:
 
     def fit_labels(
         self, seen: Sequence[Any], labels: Sequence[np.ndarray], known: Spaces, rng: np.random.Generator,
-        on_epoch: Epoch | None = None,
+        on_epoch: Epoch | None = None, model: "PPO | None" = None,
     ) -> Outcome[None, NeuralProof]:  # fmt: skip
         """The same of episodes that are labelled step by step, whatever was done in them.
 
@@ -38,6 +40,7 @@ class FitsLabels:
             known: the spaces.
             rng: as `fit`, and so the errors.
             on_epoch: as `fit`.
+            model: the same.
 
         Raises:
             NotDiscrete: actions that are not one number.
@@ -49,7 +52,14 @@ class FitsLabels:
         stacked = by_part(lambda *arrays: np.concatenate(arrays), *parts)
         actions = spaces.Discrete(int(discrete_actions(known.actions).n))
         found = self.fit(
-            stacked, np.concatenate(labels), space, actions, lengths=[*map(len, labels)], rng=rng, on_epoch=on_epoch
+            stacked,
+            np.concatenate(labels),
+            space,
+            actions,
+            lengths=[*map(len, labels)],
+            rng=rng,
+            on_epoch=on_epoch,
+            model=model,
         )
         return Outcome(None, found.status, found.proof, found.stats, Agent(found.policy.model, states))
 

@@ -10,6 +10,8 @@ import torch
 from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger, configure
+from stable_baselines3.common.preprocessing import is_image_space
+from stable_baselines3.common.torch_layers import NatureCNN
 
 from irl_gym.agents.neural_proof import Epoch, NeuralProof
 from irl_gym.agents.planners import Agent, torch_threads
@@ -17,6 +19,9 @@ from irl_gym.errors import InvalidParameter
 from irl_gym.learners.base import Outcome
 from irl_gym.programs.killable import check_limit
 from irl_gym.programs.status import Status
+
+LEAST_IMAGE = 36
+"""Pixels along each side that SB3's convolutions need."""
 
 
 class _Nowhere(gym.Env):
@@ -43,6 +48,8 @@ def untrained(
 ) -> PPO:
     """An agent of PPO that was never trained."""
     kind = "MultiInputPolicy" if isinstance(observations, spaces.Dict) else "MlpPolicy"
+    if is_image_space(observations) and min(sorted(observations.shape or ())[-2:]) >= LEAST_IMAGE:
+        kind = "CnnPolicy"
     layers = [] if net_arch is None and isinstance(observations, spaces.Discrete) else net_arch
     network = {} if layers is None else {"net_arch": list(layers)}
     model = PPO(kind, _Nowhere(observations, actions), policy_kwargs=network, seed=seed, device=device)
@@ -63,7 +70,7 @@ def trained(
         taken: (N, ...) what was done in each.
         out: (N,) the steps that are held out.
         weights: (N,) what each step counts.
-        rate: of Adam; None for 0.03 without hidden layers, else 0.001.
+        rate: of Adam; None for 0.03 without hidden layers or convolutions, else 0.001.
         epochs: as `NeuralClone` has them, and the next two.
         batch_size: steps of a minibatch.
         patience: epochs without a smaller loss.
@@ -74,6 +81,8 @@ def trained(
     network = model.policy
     seen, _ = network.obs_to_tensor(observations)
     targets = torch.as_tensor(taken, device=network.device)
+    if isinstance(network.action_space, spaces.MultiBinary):
+        targets = targets.float()  # as torch's Bernoulli takes them
     counts = torch.as_tensor(weights, dtype=torch.float32, device=network.device)
     parts = [torch.as_tensor(np.flatnonzero(mask), device=network.device) for mask in (~out, out)]
     acting = [p for name, p in network.named_parameters() if "value" not in name]
@@ -120,7 +129,8 @@ def trained(
 
 
 def _rate(model: PPO) -> float:
-    return 0.03 if model.policy.net_arch == [] else 1e-3
+    network = model.policy
+    return 0.03 if network.net_arch == [] and not isinstance(network.features_extractor, NatureCNN) else 1e-3
 
 
 def _continuous(space: spaces.Space) -> bool:

@@ -41,6 +41,8 @@ from irl_gym.tables.tabulate import tabulate
 Algorithm = Literal["PPO", "DQN", "A2C"]
 Progress = Callable[[int, Policy], None]
 """Called with the environment steps made so far and the policy as it is."""
+Start = Callable[[Any], None]
+"""Gives weights to a model of SB3 that was not trained yet."""
 
 _ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"PPO": PPO, "DQN": DQN, "A2C": A2C}
 
@@ -204,16 +206,9 @@ class SB3(Record):
             checked_number(name, getattr(self, name), "a whole number of at least 1", least=1, whole=True)
 
     def plan(
-        self,
-        env: gym.Env | VecEnv,
-        *,
-        gamma: float,
-        seed: int = 0,
-        progress: Progress | None = None,
-        interval: int = 0,
-        log: Path | None = None,
-        checkpoint: Checkpoint | None = None,
-    ) -> Agent:
+        self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0,
+        log: Path | None = None, checkpoint: Checkpoint | None = None, start: Start | None = None,
+    ) -> Agent:  # fmt: skip
         """Train a new agent.
 
         Args:
@@ -224,6 +219,7 @@ class SB3(Record):
             interval: environment steps between calls; 0 for a hundredth of the total.
             log: folder for SB3's own scalars, as TensorBoard reads them; None for no log.
             checkpoint: where the training is kept while it is under way, and gone on with; None for nowhere.
+            start: called with the new model before it is trained, to give it other weights; None for SB3's random ones.
         """
         settings = self._settings(env)
         with torch_threads(self.threads):
@@ -235,6 +231,8 @@ class SB3(Record):
             elif model.tensorboard_log is None:  # SB3's own logger leaves a folder in the temporary one
                 model.set_logger(Logger(None, [HumanOutputFormat(sys.stdout)] if model.verbose else []))
             going_on = watching.resume()
+            if start is not None and not going_on:
+                start(model)
             left = self.total_timesteps - model.num_timesteps  # none where it was killed after the last step
             model.learn(left, callback=watching, reset_num_timesteps=not going_on)
             model.logger.close()

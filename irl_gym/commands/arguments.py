@@ -127,6 +127,8 @@ class Retraining:
 
     retrain: PlannerName = "ppo"
     """Who it is."""
+    warm_start: Literal["none", "clone"] = "none"
+    """ppo and a2c. clone: training begins with a network that is cloned from the demonstrations, in place of a random one."""
     shaping: bool = True
     """Retrain on the expected advantage under the recovered reward, computed from the table; else on the reward as it is."""
     total_timesteps: Annotated[int | None, UNSET] = None
@@ -228,6 +230,7 @@ class Arguments:
             shown.after_end, expert=expert, epsilon=shown.epsilon, episodes=shown.episodes, learner=learner, features=features,
             inner=planner(self.learning.inner), shaping=self.retraining.shaping,
             retrain=planner(self.retraining.retrain, advantages=shaped), seed=self.seed,
+            warm_start=None if self.retraining.warm_start == "none" else self.retraining.warm_start,
         )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from irl_gym.agents.checkpoints import Checkpoint
 from irl_gym.agents.expert_files import FromFile
+from irl_gym.agents.neural_clone import NeuralClone
 from irl_gym.agents.planners import SB3, Agent, Planner
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.datasets import load_minari, write_minari
@@ -31,7 +32,7 @@ from irl_gym.judging.evaluation import evaluate
 from irl_gym.judging.scores import CLONE, EXPERT, LEARNED, RANDOM, RETRAINED
 from irl_gym.learners.base import Learner, Outcome
 from irl_gym.learners.interactive.labelled import write_labelled
-from irl_gym.learners.problem import Problem
+from irl_gym.learners.problem import Problem, Spaces
 from irl_gym.loop.learning_curve import Glances
 from irl_gym.loop.worlds import RunWorld
 from irl_gym.mdp.episodes import Episode
@@ -188,19 +189,24 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
 def retrained_agent(
     folder: Path, path: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
     certificate: Mapping[str, Any], config: Mapping[str, Any], solved: Mapping[str, Any], report_progress: OnProgress,
+    warm_start: str | None, env: gym.Env, demonstrations: list[Episode], seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
     paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"]["terms"].get("margin_cap"))
     kept = Checkpoint(under_way(path, "agent"), {"config": config, "reward": solved.get("sha256", {})})
     kept.seen = glances = Glances(world, _telling(report_progress, "agent", retrainer, kept))
     log = folder / LOGS / "retrained"
-    policy = world.train(logged(retrainer, log, kept), paid, glances.see)
+    shown = Problem(Spaces(env.observation_space, env.action_space, world.states), demonstrations=demonstrations)
+    rng = np.random.default_rng(seed)
+    start = None if warm_start is None else lambda model: NeuralClone().learn(shown, rng, model=model)
+    policy = world.train(logged(retrainer, log, kept, start), paid, glances.see)
     world.keep(policy, folder, "agent")
     curve = glances.curve()
     write_curve(curve, folder / "learning_curve.csv")
     if isinstance(retrainer, SB3):
         log_scalars(log, curve.steps, {"loop/true_value": curve.value, "loop/mean_return": curve.mean})
-    return {"planner": type(retrainer).__name__, "how": how_of(retrainer), **_steps(policy, kept)}
+    how = how_of(retrainer) + (", from a clone of the demonstrations" if start else "")
+    return {"planner": type(retrainer).__name__, "how": how, **_steps(policy, kept)}
 
 
 def cloned(

@@ -7,13 +7,13 @@ import pickle
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from irl_gym.agents.noise import checked_epsilon
 from irl_gym.agents.planners import Planner
-from irl_gym.checks import checked_number
+from irl_gym.checks import checked_number, is_word
 from irl_gym.demonstrations.choices import AfterEnd
 from irl_gym.demonstrations.endings import checked_after_end
 from irl_gym.errors import InvalidParameter, MissingPart
@@ -35,7 +35,7 @@ class Experiment(Record):
     Raises:
         InvalidDiscount: gamma outside (0, 1).
         InvalidParameter: fewer than 1 episodes or copies; neither environment nor dataset, or an expert beside a dataset; two
-            ways to make a table; noise outside 0 to 1.
+            ways to make a table; noise outside 0 to 1; a warm start of what is no PPO or A2C.
         MissingPart: the learner needs what this run cannot give it, such as the policy of an expert that is known by episodes.
     """
 
@@ -79,6 +79,8 @@ class Experiment(Record):
     """Retrain on the expected advantage under the learned reward, clipped; else on the reward as it is. It needs a table."""
     retrain: Planner | None = None
     """Plans or learns under the learned reward; None for SB3 with settings that suit that reward."""
+    warm_start: Literal["clone"] | None = None
+    """What training begins with: None for random weights; "clone" for a network that is cloned from the demonstrations."""
     num_envs: int | None = None
     """Copies of the environment that SB3 trains on; None for 64 of a table, 8 of a world that is stepped."""
     eval_episodes: int = 200
@@ -113,6 +115,7 @@ class Experiment(Record):
                 f"table is {self.table!r} and bins {self.bins}: expected Enumeration(...) or Interaction(...) for discrete "
                 "states, or bins for continuous ones. Leave one out."
             )
+        _check_start(self.warm_start, self.retrain)
         checked_number("samples", self.samples, "a whole number of at least 0", least=0, whole=True)
         for name in ("episodes", "num_envs", "eval_episodes"):
             if name != "num_envs" or self.num_envs is not None:
@@ -169,7 +172,22 @@ def _check_needs(learner: Any, env_id: str | None, dataset: str | None, epsilon:
         raise MissingPart(f"{type(learner).__name__} needs {part}, and {why}: expected a run that has it. {mend}")
 
 
-LATER = {"after_end": "refuse", "trust_dataset": False, "features": None}
+def _check_start(warm_start: Any, retrain: Any) -> None:
+    """Check that what is retrained can begin with a clone: a policy, of SB3.
+
+    Raises:
+        InvalidParameter: it cannot, or is no way to begin.
+    """
+    if warm_start is not None and not is_word(warm_start, "clone"):
+        raise InvalidParameter(f"warm_start is {warm_start!r:.80}: expected 'clone', or None.")
+    if warm_start is not None and retrain is not None and getattr(retrain, "algorithm", None) not in ("PPO", "A2C"):
+        raise InvalidParameter(
+            f"warm_start is 'clone', but retrain is {retrain!r:.80}: expected PPO or A2C, whose networks are policies. Leave "
+            "warm_start out."
+        )
+
+
+LATER = {"after_end": "refuse", "trust_dataset": False, "features": None, "warm_start": None}
 """Fields that earlier versions had not, and what these did."""
 MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""

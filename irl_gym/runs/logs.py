@@ -13,7 +13,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.agents.checkpoints import Checkpoint
-from irl_gym.agents.planners import SB3, Agent, Planner, Progress
+from irl_gym.agents.planners import SB3, Agent, Planner, Progress, Start
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,18 @@ class Logged:
     """Folder of TensorBoard's files."""
     checkpoint: Checkpoint
     """Where the training is kept while it is under way."""
+    start: Start | None
+    """Gives its first weights to who is trained; None for random ones."""
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Agent:
         """Train a new agent, or go on with one."""
-        return self.planner.plan(env, gamma=gamma, seed=seed, progress=progress, log=self.log, checkpoint=self.checkpoint)
+        kept = {"log": self.log, "checkpoint": self.checkpoint, "start": self.start}
+        return self.planner.plan(env, gamma=gamma, seed=seed, progress=progress, **kept)
 
 
-def logged(planner: Planner, log: Path, checkpoint: Checkpoint) -> Planner:
-    """The planner, with a log and a checkpoint of its training if it trains."""
-    return Logged(planner, log, checkpoint) if isinstance(planner, SB3) else planner
+def logged(planner: Planner, log: Path, checkpoint: Checkpoint, start: Start | None = None) -> Planner:
+    """The planner, with a log, a checkpoint and a start of its training if it trains."""
+    return Logged(planner, log, checkpoint, start) if isinstance(planner, SB3) else planner
 
 
 def log_scalars(log: Path, steps: np.ndarray, scalars: Mapping[str, np.ndarray]) -> None:

@@ -11,9 +11,13 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 
 from irl_gym.agents.neural_clone import NeuralClone
+from irl_gym.agents.planners import SB3, tabular_actions
+from irl_gym.environments.tabular_vec_env import TabularVecEnv
 from irl_gym.errors import InvalidDemonstrations, InvalidParameter, SolverTimeout
+from irl_gym.judging.metrics import policy_value
 from irl_gym.learners.problem import Problem, Spaces
-from irl_gym.mdp.episodes import Episode
+from irl_gym.mdp.episodes import Episode, collect_from_table
+from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.programs import deadline
 from irl_gym.spaces.states import StateIndex
 
@@ -47,6 +51,24 @@ def test_several_numbers_as_an_action_and_parts_as_an_observation_are_learned():
     taken = np.stack([SIDES, 2 * (POINTS[:, 0] > 0)], axis=1)
     found = FEW.fit(seen, taken, space, spaces.MultiDiscrete([2, 3]), lengths=LENGTHS)
     assert wrong(found, seen, taken) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("shape", "reader"), [((36, 40, 3), "NatureCNN"), ((3, 36, 40), "NatureCNN"), ((20, 20, 3), "FlattenExtractor")]
+)
+def test_images_are_learned_by_convolutions_where_these_can_read_them(shape, reader):
+    light = np.repeat([0, 255], 20).astype(np.uint8)
+    seen = np.broadcast_to(light.reshape(40, 1, 1, 1), (40, *shape)).copy()
+    space = spaces.Box(0, 255, shape, np.uint8)
+    found = NeuralClone(epochs=5, batch_size=8, held_out=0.0).fit(seen, light // 255, space, spaces.Discrete(2))
+    assert type(found.policy.model.policy.features_extractor).__name__ == reader
+    assert wrong(found, seen, light // 255) == 0
+
+
+def test_several_switches_as_an_action_are_learned():
+    taken = np.stack([SIDES, POINTS[:, 0] > 0], axis=1).astype(np.int8)
+    found = FEW.fit(POINTS, taken, PLANE, spaces.MultiBinary(2), lengths=LENGTHS)
+    assert wrong(found, POINTS, taken) < 0.1
 
 
 def test_a_rare_action_is_balanced():
@@ -90,14 +112,34 @@ def test_losses_are_logged(tmp_path):
     assert [one.name[:6] for one in (tmp_path / "log").iterdir()] == ["events"]
 
 
-def test_ppo_goes_on_from_the_zip_of_a_clone(tmp_path):
-    env = gym.make("CartPole-v1")
-    seen = np.random.default_rng(0).normal(size=(200, 4)).astype(np.float32)
-    found = QUICK.fit(seen, (seen[:, 2] > 0).astype(int), env.observation_space, env.action_space)
+@pytest.mark.parametrize("env_id", ["CartPole-v1", "Pendulum-v1"])
+def test_ppo_goes_on_from_the_zip_of_a_clone(env_id, tmp_path):
+    env = gym.make(env_id)
+    seen = np.random.default_rng(0).normal(size=(200, *env.observation_space.shape)).astype(np.float32)
+    taken = np.clip(seen[:, 2:3], -1, 1) if env_id == "Pendulum-v1" else (seen[:, 2] > 0).astype(int)
+    found = QUICK.fit(seen, taken, env.observation_space, env.action_space)
     found.policy.save(tmp_path / "clone.zip")
     model = PPO.load(tmp_path / "clone.zip", env=env, device="cpu", n_steps=64, batch_size=64)
     np.testing.assert_array_equal(model.predict(seen, deterministic=True)[0], found.policy.predict(seen, deterministic=True)[0])
     assert model.learn(64).num_timesteps == 64
+
+
+def test_ppo_begins_as_a_clone_of_the_demonstrations_where_it_is_warmed(toy_text):
+    table = toy_text("FrozenLake 4x4")
+    expert = policy_iteration(table.mdp, table.reward).policy
+    paid = table.payments.entries
+    episodes = [*collect_from_table(table.mdp, paid, table.states, expert, 5, max_episode_steps=100)]
+    problem, told = Problem.of(table, demonstrations=episodes), []
+    env = TabularVecEnv(table.mdp, table.reward, num_envs=4, states=table.states)
+    SB3(total_timesteps=32, hyperparameters={"n_steps": 8, "batch_size": 32}).plan(
+        env,
+        gamma=0.99,
+        progress=lambda steps, policy: told.append(
+            policy_value(table.mdp, table.reward, tabular_actions(policy, table.states))
+        ),
+        start=lambda model: NeuralClone().learn(problem, np.random.default_rng(0), model=model),
+    )
+    assert told[0] == pytest.approx(policy_value(table.mdp, table.reward, expert))
 
 
 def test_rows_of_the_table_are_shown_where_observations_have_parts():

@@ -62,6 +62,7 @@ def test_nothing_asked_for_is_the_finite_lp_on_frozen_lake():
         ({"retrain": "value-iteration"}, "retrain", ValueIteration()),
         ({"retrain": "ppo"}, "retrain", SB3(hyperparameters=FOR_ADVANTAGES)),
         ({"retrain": "ppo", "shaping": False}, "retrain", SB3()),
+        ({"warm_start": "clone"}, "warm_start", "clone"),
         ({"retrain": "ppo", "total_timesteps": 99}, "retrain", SB3("PPO", 99, FOR_ADVANTAGES)),
         ({"seed": 5}, "seed", 5),
         ({}, "start_seeds", ()),

@@ -15,6 +15,7 @@ from stopped import HANG
 
 from irl_gym.agents.planners import SB3
 from irl_gym.errors import RunIncomplete
+from irl_gym.judging.curves import read_curve
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.loop import filming, final_stages, loop
 from irl_gym.loop.pipeline import recover_and_retrain
@@ -120,3 +121,10 @@ def test_a_run_whose_records_lost_their_digests_goes_on_with_its_agent(unvouched
     monkeypatch.setitem(loop.MAKERS, "figures", ())
     (unvouched / ".stages" / "agent.json").unlink()
     assert run(unvouched).metrics["training"]["environment_steps"] >= 2_048
+
+
+def test_an_agent_that_is_warmed_begins_as_a_clone_of_the_demonstrations(tmp_path):
+    report = run(tmp_path / "run", warm_start="clone", retrain=SB3(total_timesteps=512))
+    curve, told = read_curve(tmp_path / "run/learning_curve.csv"), report.metrics["policies"]
+    assert curve.value[0] == pytest.approx(told["expert"]["value"])
+    assert told["retrained"]["how"] == "trained by PPO, from a clone of the demonstrations"

@@ -80,6 +80,7 @@ CASES = [
     ("Leave expert and epsilon out.", lambda _: asking(dataset="me/a-v0", epsilon=0.1), lambda _: asking(dataset="me/a-v0")),
     ("Leave one out.", lambda _: asking(table=Interaction(9), bins=3), lambda _: asking(bins=3)),
     ("Leave one out.", lambda _: parse_keywords(["a=1", "a=2"]), lambda _: parse_keywords(["a=2"])),
+    ("Leave warm_start out.", lambda _: asking(warm_start="clone", retrain=SB3("DQN")), lambda _: asking(retrain=SB3("DQN"))),
     ("Leave epsilon out.", lambda _: asking(epsilon=0.1, learner=Needy("expert")), lambda _: asking(learner=Needy("expert"))),
     ("Leave dataset out, and give env_id.", lambda _: asking(dataset="me/a-v0", learner=Needy("oracle")),
      lambda _: asking(learner=Needy("oracle"))),

@@ -96,7 +96,7 @@ class Log:
         except (InvalidDemonstrations, InvalidParameter) as error:
             raise type(error)(ARGUMENT.sub(self._option, str(error))) from error
         for one in said:  # what is left out, in a line each
-            print_error(type(one.message)(ARGUMENT.sub(self._option, str(one.message))))
+            print_error(one.category(ARGUMENT.sub(self._option, str(one.message))))
         return found
 
     def _option(self, argument: re.Match[str]) -> str:

@@ -93,7 +93,7 @@ def on_table(env_id: str, updates: int, share: float | None, **options: Any) -> 
         return float(total)
 
     seen = np.concatenate([one.observations[:-1] for one in drawn])
-    steps = {"observations": seen, "actions": np.concatenate([one.actions for one in drawn])}
+    steps = {"observations": seen, "actions": np.concatenate([one.taken("an expert's episode") for one in drawn])}
     steps["lengths"] = np.array([len(one) for one in drawn])
     return Task(env, steps, math.ceil(updates * BATCH / len(seen)), worth, lambda rows: best[rows], share)
 

@@ -41,7 +41,7 @@ from irl_gym.tables.tabulate import tabulate
 Algorithm = Literal["PPO", "DQN", "A2C"]
 Progress = Callable[[int, Policy], None]
 """Called with the environment steps made so far and the policy as it is."""
-Start = Callable[[Any], None]
+Start = Callable[[Any], object]
 """Gives weights to a model of SB3 that was not trained yet."""
 
 _ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"PPO": PPO, "DQN": DQN, "A2C": A2C}

@@ -97,7 +97,7 @@ def play_on(play: "Play", mode: str) -> None:
 
 def be_asked(asked: Arguments) -> int:
     """Answer a learner's questions, and say what it learned."""
-    from irl_gym.commands.demonstrating.asking import Questions, Left, Person, answers_in
+    from irl_gym.commands.demonstrating.asking import Left, Person, Questions, answers_in
     from irl_gym.commands.demonstrating.keyboard import controls_of
     from irl_gym.commands.demonstrating.playing import stage
     from irl_gym.commands.demonstrating.screens import terminal_keys, window_keys

@@ -30,7 +30,7 @@ from irl_gym.errors import InvalidParameter, NotDiscrete, a_type
 from irl_gym.learners.base import Outcome, featured
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.interactive.answers import Noted
-from irl_gym.learners.interactive.classes import OfRows, PolicyClass, OfObservations, check_clones
+from irl_gym.learners.interactive.classes import OfObservations, OfRows, PolicyClass, check_clones
 from irl_gym.learners.interactive.labels import Asking, Labels
 from irl_gym.learners.interactive.prices import prices
 from irl_gym.learners.interactive.proofs import DaggerProof

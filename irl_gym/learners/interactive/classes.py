@@ -1,6 +1,6 @@
 """The classes of policies that labels are cloned in: of numbered states, or of observations, by a network.
 
-    of rows           `fit(weights, table)` of `Clone`, `SoftmaxClone`; a policy (S, A); `fit_costs` where mistakes have prices
+    of rows           `fit(weights, table)` of `Clone`, `SoftmaxClone`; a policy is (S, A); `fit_costs` at the price of mistakes
     of observations   `fit_labels(observations, labels, spaces)` of `NeuralClone`; a policy has `predict`, and is deterministic
 Axes: S states, A actions.
 """

@@ -208,6 +208,7 @@ def test_the_page_says_that_a_counted_table_judged(runs):
 KILLED = """
 import os, signal, sys
 import gymnasium as gym
+import numpy as np
 from gymnasium import spaces
 from irl_gym.tables.enumeration.table import Enumeration
 from irl_gym.runs.experiment import Experiment
@@ -220,7 +221,7 @@ class Counted(gym.Env):
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         self.x, self.y = 6, 6
-        return (self.x, self.y), {}
+        return np.array((self.x, self.y)), {}
     def step(self, action):
         Counted.steps += 1
         if Counted.steps == dies_at:
@@ -228,7 +229,7 @@ class Counted(gym.Env):
         dx, dy = ((0, 1), (1, 0), (0, -1), (-1, 0))[action]
         self.x, self.y = min(max(self.x + dx, 0), 11), min(max(self.y + dy, 0), 11)
         end = self.x == self.y == 11
-        return (self.x, self.y), float(end), end, False, {}
+        return np.array((self.x, self.y)), float(end), end, False, {}
 
 gym.register("Counted-v0", entry_point=Counted, max_episode_steps=150)
 asked = Experiment("Counted-v0", 0.9, episodes=5, eval_episodes=5, retrain=ValueIteration(), table=Enumeration(every=0))

@@ -47,7 +47,7 @@ class Within:
         self.table, self.horizon = checked_table(table), horizon
         self.mdp = time_expanded(table, horizon)
         array = policy_array(expert)
-        unknown = np.isnan(array).all(axis=-1) if array.dtype.kind == "f" else np.zeros(array.shape[:1], dtype=bool)
+        unknown = np.asarray(np.isnan(array).all(axis=-1) if array.dtype.kind == "f" else np.zeros(array.shape[:1], dtype=bool))
         known = np.where(unknown[..., None], 1 / array.shape[-1], array) if unknown.any() else array
         self.expert = expanded_policy(known, table, horizon)
         if unknown.any():

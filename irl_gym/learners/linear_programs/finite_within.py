@@ -47,11 +47,7 @@ class Within:
         self.table, self.horizon = checked_table(table), horizon
         self.mdp = time_expanded(table, horizon)
         array = policy_array(expert)
-<<<<<<< HEAD
-        unknown = np.atleast_1d(np.isnan(array).all(axis=-1) if array.dtype.kind == "f" else np.zeros(len(array), dtype=bool))
-=======
         unknown = np.asarray(np.isnan(array).all(axis=-1) if array.dtype.kind == "f" else np.zeros(array.shape[:1], dtype=bool))
->>>>>>> h/horizon
         known = np.where(unknown[..., None], 1 / array.shape[-1], array) if unknown.any() else array
         self.expert = expanded_policy(known, table, horizon)
         if unknown.any():

@@ -1,17 +1,13 @@
-"""The mends that errors of learners, of sets of rewards and of distances name are executed, and serve."""
+"""The mends that errors of learners and of sets of rewards name are executed, and serve."""
 
 import os
 from pathlib import Path
-from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
 import pytest
-from enumeration_envs import Shows
 from gymnasium import spaces
-from gymnasium.wrappers import FlattenObservation
-from judging.distances.samples import CONTINUING, ENDING, drawn, function, rewards_of
-from mended import SHOWN, mends, told, unsaid
+from mended import told, unsaid
 from models import random_model, ring
 from patients import partly_contradicted
 
@@ -22,12 +18,9 @@ from irl_gym.environments.generative import GenerativeModel
 from irl_gym.errors import RunConflict
 from irl_gym.features.bases import RadialBasis
 from irl_gym.features.feature_maps import Functions, OneHot
-from irl_gym.features.linear_reward import LinearReward
 from irl_gym.judging.ambiguity.lambda_path import lambda_path
 from irl_gym.judging.ambiguity.uniqueness import optimal_face
 from irl_gym.judging.ambiguity.widths import feasible_widths
-from irl_gym.judging.distances import TableModel, Transitions, epic, sampled_dard, sampled_pearson, sampled_starc, starc
-from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.cloning.clone import Clone
 from irl_gym.learners.cloning.softmax import SoftmaxClone
 from irl_gym.learners.interactive.dagger import DAgger
@@ -36,7 +29,7 @@ from irl_gym.learners.linear_programs.feature import FeatureLP
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.learners.problem import Oracle, Problem, Spaces
 from irl_gym.learners.registry import learner_class
-from irl_gym.mdp.episodes import Episode, collect
+from irl_gym.mdp.episodes import Episode
 from irl_gym.mdp.optimality import certify
 from irl_gym.mdp.planning.dynamic_programming import policy_iteration
 from irl_gym.mdp.policies import TabularPolicy
@@ -54,7 +47,6 @@ HALF = np.array([[1.0, 0.0], [np.nan, np.nan]])
 CONTRADICTED, NEAR = partly_contradicted(), Functions(lambda x: (x[:, :1] < 0.2).astype(float), 1)
 UNKNOWN_LAST = np.array([[1.0, 0.0]] * 4 + [[np.nan] * 2])
 STEPS = {"reward_on": "state-action"}
-R, S = rewards_of(CONTINUING)
 ONCE = np.outer(np.arange(5) < 2, np.arange(3.0))
 
 
@@ -113,41 +105,6 @@ def path(expert=MODEL.expert, **how):
     return lambda_path(MODEL.mdp, expert, **how)
 
 
-def dard(first=R, second=S, n=1000, replicates=8, transitions=None, model=None):
-    transitions, rng = transitions or drawn(CONTINUING, 0, n)[0], np.random.default_rng(0)
-    return sampled_dard(function(first), function(second), transitions, gamma=0.9, model=model or TableModel(CONTINUING.mdp),
-                        actions=np.arange(3), replicates=replicates, rng=rng)  # fmt: skip
-
-
-def played(policy):
-    transitions, _, rng = drawn(CONTINUING, 0, 50)
-    return sampled_starc(function(R), function(S), transitions, gamma=0.9, model=TableModel(CONTINUING.mdp), policy=policy,
-                         horizon=3, rng=rng)  # fmt: skip
-
-
-def of_parts(wrapper=lambda env: env):
-    """DARD of an environment whose observations have parts."""
-    env = wrapper(Shows(*SHOWN["a tuple with a float"]))
-    transitions = Transitions.from_episodes(
-        collect(env, Acting.of(lambda seen: int(np.sum(seen[0])) % 2, env), 3, max_episode_steps=9)
-    )
-
-    def pays(observations, actions, following):
-        return following[:, 0] + actions
-
-    return sampled_dard(pays, lambda *step: pays(*step) ** 2, transitions, gamma=0.9, actions=np.arange(2),
-                        model=lambda here, *_: (here, np.zeros(len(here), bool)), rng=np.random.default_rng(0))  # fmt: skip
-
-
-def coverage(make, model=ENDING):
-    weights = np.ones((8, 3))
-    return epic(model.mdp, *rewards_of(model), coverage=None if make is None else make(weights))
-
-
-def first_parts(batch, actions=2, **more):
-    return Transitions(batch, np.zeros(actions, int), np.arange(actions), **more)
-
-
 def hurried(limit):
     Deadline.after(limit).check()
     return True
@@ -158,16 +115,9 @@ def in_child(limit, code):
         return code is None or called(1e18, os._exit, code)
 
 
-def pearson(groups):
-    return sampled_pearson(function(R), function(S), first_parts(np.arange(8), 8, groups=groups), None)
-
-
-AGENT = SimpleNamespace(predict=lambda observations: (np.zeros(len(observations), int), None))
 AGAINST = dict(enumerate(-MODEL.R))
 AT_ONE, FEW = {3: 1.0}, {s: AGAINST[s] for s in range(3)}
 HUGE = -1e308 * MODEL.R / np.abs(MODEL.R).max()
-ACTING = ~ENDING.mdp.terminal[:, None]
-EVEN = ACTING / (ACTING.sum() * 3) * np.ones((8, 3))
 ASIDE = TabularMDP.from_dense(
     np.array([[[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], [[0, 0, 0], [0, 0, 0]]]) * 1.0, 0.9, np.eye(3)[0]
 )
@@ -257,43 +207,7 @@ CASES = [
      lambda: Problem(Spaces(spaces.Discrete(9), spaces.Discrete(3)), dynamics=MODEL.mdp), lambda: Problem.of(MODEL.mdp)),
     ("Divide it by its largest number: the answer is the same, in other units.",
      lambda: certify(MODEL.mdp, MODEL.expert, HUGE), lambda: certify(MODEL.mdp, MODEL.expert, HUGE / np.abs(HUGE).max())),
-    # distances
-    ("Let it follow itself.",
-     lambda: epic_bound(ENDING.mdp, *rewards_of(ENDING)),
-     lambda: epic_bound(following_itself(ENDING), *rewards_of(ENDING))),
-    ("The reward is zero, constant or only a potential, or the coverage too narrow. Of rewards in a table, `starc` has a place "
-     "for it.",
-     lambda: epic(CONTINUING.mdp, R, 0 * R), lambda: starc(CONTINUING.mdp, R, 0 * R) > 0),
-    ("Give weight to states that act,", lambda: coverage(np.zeros_like), lambda: coverage(lambda weights: EVEN) > 0),
-    ("or pass None for all of them.", lambda: coverage(np.zeros_like), lambda: coverage(None) > 0),
-    ("Pass None for uniform over the others.", lambda: coverage(lambda weights: weights / 24), lambda: coverage(None) > 0),
-    ("Divide by the sum.",
-     lambda: coverage(lambda weights: weights, CONTINUING),
-     lambda: coverage(lambda weights: weights / weights.sum(), CONTINUING) > 0),
-    ("The reward is constant or only a potential, or drowned in the noise of the draws. Raise `replicates`,",
-     lambda: dard(R, S, 2, 2), lambda: dard(R, S, 2, 300)),
-    ("or the number of transitions.", lambda: dard(R, S, 2, 2), lambda: dard(R, S, 1000, 2)),
-    ("Give more episodes;", lambda: pearson(np.zeros(8)), lambda: pearson(np.arange(8) // 4)),
-    ("or, without it, groups=None for transitions in order.", lambda: pearson(np.zeros(8)), lambda: pearson(None)),
-    ("pass its `.reward`.", lambda: epic(MODEL.mdp, fit(), fit()), lambda: epic(MODEL.mdp, fit().reward, fit().reward) < 1e-6),
-    ("Pass `reward.tabular(states)`.",
-     lambda: epic(MODEL.mdp, LinearReward(np.arange(5), OneHot(5)), MODEL.R),
-     lambda: epic(MODEL.mdp, LinearReward(np.arange(5), OneHot(5)).tabular(StateIndex(spaces.Discrete(5))), MODEL.R) > 0),
-    ("Of SB3's predict take the first part: `lambda observations, rng: agent.predict(observations)[0]`.",
-     lambda: played(lambda observations, rng: AGENT.predict(observations)),
-     lambda: played(eval(mends(told(played, lambda observations, rng: AGENT.predict(observations)))[0], {"agent": AGENT}))),
-    ("Flatten them, for example with `gymnasium.wrappers.FlattenObservation`.", of_parts, lambda: of_parts(FlattenObservation)),
-    ("Of shape (2, 1) it is `terminated.ravel()`.",
-     lambda: first_parts(np.zeros(2), terminated=np.zeros((2, 1))),
-     lambda: first_parts(np.zeros(2), terminated=np.zeros((2, 1)).ravel())),
-    ("Stack a list with `np.array`.", lambda: first_parts([0, 1]), lambda: first_parts(np.array([0, 1]))),
 ]  # fmt: skip
-
-
-def following_itself(model):
-    P = model.P.copy()
-    P[model.mdp.terminal] = np.eye(8)[model.mdp.terminal][:, None]
-    return TabularMDP.from_dense(P, 0.9, model.mdp.d0)
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), CASES, ids=[one[0] for one in CASES])
@@ -303,11 +217,7 @@ def test_a_mend_that_an_error_about_rewards_names_serves(says, breaks, mended):
 
 def test_every_mend_that_an_error_about_rewards_names_is_executed():
     root = Path(irl_gym.__file__).parent
-    files = [
-        one.relative_to(root)
-        for folder in ("learners", "judging/ambiguity", "judging/distances")
-        for one in (root / folder).rglob("*.py")
-    ]
+    files = [one.relative_to(root) for folder in ("learners", "judging/ambiguity") for one in (root / folder).rglob("*.py")]
     assert not unsaid(CASES, *files, "killable.py", "warm_lp.py", "linear_program.py", "solvers.py", "deadline.py", "howard.py")
 
 

@@ -34,7 +34,6 @@ SOFT = FiniteLP(slack=1.0)
 FEW = {"eval_episodes": 400, "retrain": ValueIteration()}
 LAKE = {"map_name": "4x4", "max_episode_steps": LIMIT}
 
-
 pytestmark = pytest.mark.usefixtures("without_figures")
 
 
@@ -76,9 +75,8 @@ def two(source, tmp_path_factory):
     """A run from two episodes."""
     root = tmp_path_factory.mktemp("two")
     write_minari(episodes_of(source)[:2], "me/two-v0", gym.make("FrozenLake-v1", **LAKE), root=root, algorithm="two")
-    return recover_and_retrain(
-        Experiment(None, GAMMA, dataset="me/two-v0", dataset_root=str(root), learner=SOFT, **FEW), root / "run"
-    )
+    asked = Experiment(None, GAMMA, dataset="me/two-v0", dataset_root=str(root), learner=SOFT, **FEW)
+    return recover_and_retrain(asked, root / "run")
 
 
 @pytest.mark.parametrize("unfinished", ["metrics", "all"])
@@ -89,10 +87,11 @@ def test_a_dataset_that_was_swapped_is_named_unless_nothing_was_made_of_it(two, 
     for kept in (out / ".stages").glob("*.json"):
         if unfinished in ("all", kept.stem) and kept.stem != "start":
             kept.unlink()
+    others = [Episode(np.array([0, 4]), np.array([1]), np.zeros(1), False, True)] * 3
     place = Path(asked["dataset_root"]) / "me"
     try:
         shutil.rmtree(place / "two-v0")
-        write_minari(two_others(), "me/two-v0", gym.make("FrozenLake-v1", **LAKE), root=place.parent, algorithm="two")
+        write_minari(others, "me/two-v0", gym.make("FrozenLake-v1", **LAKE), root=place.parent, algorithm="two")
         if unfinished == "all":
             assert recover_and_retrain(experiment, out).metrics["demonstrations"]["episodes"] == 3
             return
@@ -102,10 +101,6 @@ def test_a_dataset_that_was_swapped_is_named_unless_nothing_was_made_of_it(two, 
     finally:
         shutil.rmtree(place)
         shutil.copytree(data, place)
-
-
-def two_others():
-    return [Episode(np.array([0, 4]), np.array([1]), np.zeros(1), False, True)] * 3
 
 
 def printed(report):
@@ -282,10 +277,8 @@ def test_the_doctor_finds_that_two_episodes_are_few(two, from_data):
 
 def test_the_report_counts_what_the_doctor_found(two):
     count = len(read_json(two.out / "diagnosis.json")["findings"])
-    assert (
-        count > 1
-        and f"The doctor: {count} findings. This command tells them, with mends: irl-gym doctor --run {two.out}" in printed(two)
-    )
+    told = f"The doctor: {count} findings. This command tells them, with mends: irl-gym doctor --run {two.out}"
+    assert count > 1 and told in printed(two)
 
 
 def test_one_episode_is_all_there_is_where_nothing_is_left_to_chance(tmp_path):
@@ -302,7 +295,5 @@ def test_policies_that_do_the_same_are_judged_by_the_same_episodes(source):
     expert, agent = (np.load(source.out / f"{name}.npz")["actions"] for name in ("expert", "agent_policy"))
     acting = [0, 1, 2, 3, 4, 6, 8, 9, 10, 13, 14]  # the others are holes and the goal
     np.testing.assert_array_equal(expert[acting], agent[acting])
-    rows = source.metrics["policies"]
-    assert [rows["expert"][key] for key in ("mean_return", "return_low")] == [
-        rows["retrained"][key] for key in ("mean_return", "return_low")
-    ]
+    rows, keys = source.metrics["policies"], ("mean_return", "return_low")
+    assert [rows["expert"][key] for key in keys] == [rows["retrained"][key] for key in keys]

@@ -286,10 +286,8 @@ FILES = [f"{name}.py" for name in (
     "rewarded_vec_env bases feature_maps feature_sums generative keyboard published_table published_model "
     "watching_wrappers layouts names space_json"
 ).split()]  # fmt: skip
-ELSEWHERE = (  # test_mends_of_the_facade
-    "Give its `mdp`.", "Give its `reward`.", "Learn one, such as with `FiniteLP().fit(mdp, expert)`.",
-    "Give the Tabulation of this environment.",
-)  # fmt: skip
+ELSEWHERE = ("Give its `mdp`.", "Give its `reward`.", "Learn one, such as with `FiniteLP().fit(mdp, expert)`.",
+             "Give the Tabulation of this environment.")  # fmt: skip  # test_mends_of_the_facade
 
 
 @pytest.mark.parametrize(("says", "breaks", "mended"), [(says, breaks, rest) for says, breaks, *rest in CASES],

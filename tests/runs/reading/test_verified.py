@@ -99,11 +99,8 @@ def test_a_run_with_a_swapped_file_is_made_whole_as_the_error_says(unvouched, fi
 
 
 def test_what_is_said_of_the_expert_is_computed_and_not_read(unvouched, run):
-    for name in ("metrics.json", "certificate.json"):
-        edited(
-            unvouched / name,
-            **({"reward.expert_optimal": False} if name == "metrics.json" else {"optimality.expert_optimal": False}),
-        )
+    for name, entry in (("metrics.json", "reward.expert_optimal"), ("certificate.json", "optimality.expert_optimal")):
+        edited(unvouched / name, **{entry: False})
     assert read_run(unvouched).metrics["reward"] == run.metrics["reward"] and run.recomputed
 
 

@@ -130,10 +130,8 @@ def test_a_dataset_alone_is_learned_from(finished, tmp_path, called):
     assert all(words in said for words in ("that of its episodes, paid by the table", "an optimal action", "table:"))
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs(tmp_path, called):
-    made = called(
-        SCRIPT,
+def test_an_environment_that_hides_something_is_learned_from_an_expert_that_errs(tmp_path):
+    made = run(
         "--env-id", "Taxi-v4", "--env-kwargs", "fickle_passenger=true", "--epsilon", "0.2", "--episodes", "60",
         "--retrain", "value-iteration", cwd=tmp_path,
     )  # fmt: skip

@@ -45,7 +45,7 @@ def called(capsys, monkeypatch, unchecked):
 @pytest.fixture
 def script(called):
     """A script by its name, called in this process."""
-    return lambda name, *arguments, cwd: called(ROOT / "scripts" / f"{name}.py", *arguments, cwd=cwd)
+    return lambda name, *arguments, **how: called(ROOT / "scripts" / f"{name}.py", *arguments, **how)
 
 
 @pytest.fixture(scope="session")

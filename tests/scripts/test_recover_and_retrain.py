@@ -201,7 +201,7 @@ main(["run", "--env-id", "Nothing-v0", *{more}])
 print(Watch.seen)
 """
     made = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=HANG)
-    assert made.stdout.startswith("loading: begun\n\n"), made.stderr
+    assert made.stdout.endswith("loading: begun\n\n"), made.stdout
 
 
 @pytest.fixture(scope="module")

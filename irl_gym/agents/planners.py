@@ -41,7 +41,7 @@ from irl_gym.tables.tabulate import tabulate
 Algorithm = Literal["PPO", "DQN", "A2C"]
 Progress = Callable[[int, Policy], None]
 """Called with the environment steps made so far and the policy as it is."""
-WarmStart = Callable[[Any], object]
+FirstWeights = Callable[[Any], object]
 """Gives weights to a model of SB3 that was not trained yet."""
 
 _ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"PPO": PPO, "DQN": DQN, "A2C": A2C}
@@ -207,7 +207,7 @@ class SB3(Record):
 
     def plan(
         self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None, interval: int = 0,
-        log: Path | None = None, checkpoint: Checkpoint | None = None, start: WarmStart | None = None,
+        log: Path | None = None, checkpoint: Checkpoint | None = None, start: FirstWeights | None = None,
     ) -> Agent:  # fmt: skip
         """Train a new agent.
 

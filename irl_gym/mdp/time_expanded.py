@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from irl_gym._typing import Sparse
 from irl_gym.checks import any_array
-from irl_gym.errors import InvalidMDP, InvalidPolicy, InvalidReward
+from irl_gym.errors import InvalidMDP, InvalidPolicy, InvalidReward, a_type
 from irl_gym.mdp.policies import as_distribution, policy_array
 from irl_gym.mdp.rewards import TabularReward, as_reward
 from irl_gym.mdp.tabular_mdp import TabularMDP, TransitionTable, checked_horizon
@@ -57,7 +57,7 @@ def checked_table(table: Any) -> TransitionTable:
     if isinstance(table, TransitionTable):
         return table
     mend = " Give its `mdp`." if hasattr(table, "mdp") else ""
-    raise InvalidMDP(f"table is a {type(table).__name__}: expected a TransitionTable or a TabularMDP.{mend}")
+    raise InvalidMDP(f"table is {a_type(table)}: expected a TransitionTable or a TabularMDP.{mend}")
 
 
 def depends_on_time(policy: np.ndarray) -> bool:

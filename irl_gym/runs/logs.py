@@ -13,7 +13,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
 from irl_gym.agents.checkpoints import Checkpoint
-from irl_gym.agents.planners import SB3, Agent, Planner, Progress, WarmStart
+from irl_gym.agents.planners import SB3, Agent, FirstWeights, Planner, Progress
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Logged:
     """Folder of TensorBoard's files."""
     checkpoint: Checkpoint
     """Where the training is kept while it is under way."""
-    start: WarmStart | None
+    start: FirstWeights | None
     """Gives its first weights to who is trained; None for random ones."""
 
     def plan(self, env: gym.Env | VecEnv, *, gamma: float, seed: int = 0, progress: Progress | None = None) -> Agent:
@@ -35,7 +35,7 @@ class Logged:
         return self.planner.plan(env, gamma=gamma, seed=seed, progress=progress, **kept)
 
 
-def logged(planner: Planner, log: Path, checkpoint: Checkpoint, start: WarmStart | None = None) -> Planner:
+def logged(planner: Planner, log: Path, checkpoint: Checkpoint, start: FirstWeights | None = None) -> Planner:
     """The planner, with a log, a checkpoint and a start of its training if it trains."""
     return Logged(planner, log, checkpoint, start) if isinstance(planner, SB3) else planner
 

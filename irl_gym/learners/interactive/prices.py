@@ -9,7 +9,7 @@ Axes: S states, A actions.
 from typing import Any
 
 from irl_gym._typing import Matrix
-from irl_gym.errors import InvalidParameter
+from irl_gym.errors import InvalidParameter, a_type
 from irl_gym.mdp.planning.dynamic_programming import backup, policy_evaluation
 from irl_gym.mdp.policies import TabularPolicy
 from irl_gym.mdp.rewards import TabularReward
@@ -24,7 +24,7 @@ def prices(oracle: Any, mdp: TabularMDP | None, reward: TabularReward | None) ->
     """
     policy = oracle.policy
     if mdp is None or reward is None or not isinstance(policy, TabularPolicy):
-        given = {"no table": mdp is None, "no reward": reward is None, f"an oracle that is a {type(policy).__name__}": True}
+        given = {"no table": mdp is None, "no reward": reward is None, f"an oracle that is {a_type(policy)}": True}
         lacks = next(name for name, missing in given.items() if missing)
         raise InvalidParameter(
             f"cost is 'advantage', and there is {lacks}: expected a table, its reward, and an oracle that is a table of "

@@ -132,6 +132,7 @@ def test_the_metrics_have_the_documented_keys(runs, name):
     own = {"learned"} if name in TRAJECTORIES else set()
     assert set(metrics["policies"]) == {"expert", "random", "clone", "retrained"} | own
     row = {"how", "value", "score", "mean_return", "return_low", "return_high", "return_share", "agreement"}
+    row |= {"expected_return"} if metrics["table"] is not None and metrics["table"]["exact"] else set()
     assert all(set(one) == row for one in metrics["policies"].values())
     assert (metrics["table"] is None) == (name in STEPPED) and metrics["demonstrations"]["given"] == (name in DATA)
 

@@ -8,7 +8,7 @@ import json
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -189,7 +189,7 @@ def _check_kept(learner: Learner, certificate: Mapping[str, Any], record: Mappin
 def retrained_agent(
     folder: Path, path: Path, retrainer: Planner, world: RunWorld, learned: TabularReward | LinearReward, shaping: bool,
     certificate: Mapping[str, Any], config: Mapping[str, Any], solved: Mapping[str, Any], report_progress: OnProgress,
-    warm_start: str | None, env: gym.Env, demonstrations: list[Episode], seed: int,
+    warm_start: Literal["clone"] | None, env: gym.Env, demonstrations: list[Episode], seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     """An agent that is paid by the learned reward only; its learning curve judges it, and does not steer."""
     paid = world.paid(learned, shaped=shaping, margin_cap=certificate["proof"]["terms"].get("margin_cap"))

@@ -24,7 +24,7 @@ def seen(seed, kind="sparse", share=0.6, wrong=0.0, S=9, A=3):
     known = rng.random(S) < share
     known[rng.integers(S - 2)] = True
     expert = np.where(known[:, None], np.eye(A)[actions], np.nan)
-    return model, expert, rng.integers(1, 30, size=S).astype(float)
+    return model, expert, np.where(known, rng.integers(1, 30, size=S), 0.0)
 
 
 def relative(model, expert, visits):

@@ -36,6 +36,8 @@ def sound_reward(reward):
     assert np.isfinite(reward.tabular(StateIndex(SPACE)).values).all() and reward.features.scaling
 
 
-def sound_episode(one):
-    assert len(one.actions) == len(one.rewards) == len(one.observations) - 1 >= 1 and one.actions.dtype.kind in "iu"
-    assert np.isfinite(one.rewards).all()
+def sound_episode(one, n_actions=4):
+    assert len(one.rewards) == len(one.observations) - 1 >= 1 and np.isfinite(one.rewards).all()
+    if one.actions is not None:  # of states alone
+        assert one.actions.shape == one.rewards.shape and one.actions.dtype.kind in "iu"
+        assert (one.actions >= 0).all() and (one.actions < n_actions).all()

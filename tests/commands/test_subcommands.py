@@ -51,7 +51,8 @@ def test_learners_are_told_by_what_they_declare(here, monkeypatch):
     found = {row[0]: row[1:] for row in rows(["own_learner_here:Twin"])}
     assert [*found] == [*BUILT_IN, "own_learner_here:Twin"]
     assert {name: row[0] for name, row in found.items()} == {name: learner_class(name).needs.column for name in found}
-    assert found["trajectory-lp"][1:] == ["yes (demonstrations)", "yes (environment)", "no", "no", "features (optional)"]
+    alone = "yes (demonstrations; states alone)"
+    assert found["trajectory-lp"][1:] == [alone, "yes (environment)", "no", "no", "features (optional)"]
     assert found["own_learner_here:Twin"] == found["finite-lp"]
 
 

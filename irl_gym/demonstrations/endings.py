@@ -106,7 +106,9 @@ def _complete(here: str, raw: Any, after_end: AfterEnd) -> int:
     counts["observations"] = min(batch_sizes(raw.observations)) - 1  # the last one follows the last action
     steps, fewest = counts["actions"], min(counts.values())
     if fewest < 1:
-        raise InvalidDemonstrations(f"{here} has no steps: expected at least one. Leave it out.")
+        fewer = next(name for name, count in counts.items() if count == fewest)
+        what = f"{steps} actions and no {fewer} for them" if steps > 0 else "no steps"
+        raise InvalidDemonstrations(f"{here} has {what}: expected at least one. Leave it out.")
     for name, count in counts.items():
         if count != steps and after_end == "refuse":
             one = name == "observations"

@@ -3,10 +3,13 @@
 import contextlib
 from typing import Any
 
+from gymnasium.vector import VectorEnv
+
 
 def close(env: Any) -> None:
     """Close an environment, or several that step together; an error of theirs is let go, and they are not asked again."""
     with contextlib.suppress(Exception):
         env.close()
-    if hasattr(env, "closed"):
-        env.closed = True  # or a VectorEnv would ask again when it is forgotten
+    if isinstance(env, VectorEnv):
+        with contextlib.suppress(Exception):  # `closed` may be somebody's own, too
+            env.closed = True  # or it would ask again when it is forgotten

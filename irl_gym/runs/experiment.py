@@ -7,6 +7,7 @@ import pickle
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from enum import Enum
 from typing import Any, Literal
 
 import numpy as np
@@ -191,6 +192,8 @@ LATER = {"after_end": "refuse", "trust_dataset": False, "features": None, "warm_
 """Fields that earlier versions had not, and what these did."""
 MOST_LISTED = 64
 """Numbers of an array that a configuration lists."""
+SAY_ALL = frozenset({"builtins", "datetime", "decimal", "fractions", "pathlib", "uuid"})
+"""Modules whose objects may be told by their text."""
 
 
 def digest_of(config: Mapping[str, Any]) -> str:
@@ -222,14 +225,18 @@ def as_config(value: Any) -> Any:
             return as_config(value.tolist())
         content = None if value.dtype.hasobject else np.ascontiguousarray(value).tobytes()
         return {"array": list(value.shape), "sha256": _digest(value.tolist()) if content is None else _sha256(content)}
-    if callable(value):
-        return getattr(value, "__qualname__", type(value).__name__)
+    if hasattr(value, "__qualname__"):  # a function, or a class
+        return value.__qualname__
+    kind = type(value)
+    if not isinstance(value, str | int | float | Enum | None) and not hasattr(value, "tolist") and not _says_all(value):
+        return {"object": f"{kind.__module__}.{kind.__qualname__}", "sha256": _digest(value)}
     plain = json.loads(json.dumps(value, default=plain_json))
-    if isinstance(plain, float) and not math.isfinite(plain):
-        return {"float": str(plain)}
-    if isinstance(plain, str) and not isinstance(value, str) and " at 0x" in plain:  # where it is in memory
-        return {"object": f"{type(value).__module__}.{type(value).__qualname__}", "sha256": _digest(value)}
-    return plain
+    return {"float": str(plain)} if isinstance(plain, float) and not math.isfinite(plain) else plain
+
+
+def _says_all(value: Any) -> bool:
+    """Does an object's text hold all of it? Not that of a table, which is shortened, or of who says where it is in memory."""
+    return type(value).__module__.partition(".")[0] in SAY_ALL and " at 0x" not in str(value)
 
 
 def _digest(value: Any) -> str | None:

@@ -78,6 +78,18 @@ def test_an_episode_with_another_number_of_flags_is_refused_by_name(data, tmp_pa
         read(tmp_path)
 
 
+@pytest.mark.parametrize("choice", ["refuse", "cut"])
+@pytest.mark.parametrize(
+    ("column", "values"), [("terminations", np.zeros(0, bool)), ("rewards", np.zeros(0)), ("observations", [0])]
+)
+def test_an_episode_without_any_of_something_is_told_what_is_not_there(data, tmp_path, column, values, choice):
+    data(**{column: values})
+    with pytest.raises(
+        InvalidDemonstrations, match=rf"episode 1 has 5 actions and no {column} for them: expected at least one"
+    ):
+        read(tmp_path, choice)
+
+
 def test_an_episode_with_too_few_flags_is_cut_to_the_steps_that_have_them(data, tmp_path):
     data(terminations=np.zeros(3, dtype=bool))
     cut = read(tmp_path, "cut")

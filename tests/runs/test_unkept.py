@@ -1,8 +1,12 @@
 """Environments made with arrays and objects, or whose `close` raises: the run goes on, and what it leaves out is said."""
 
+from functools import partial
+
 import gymnasium as gym
 import numpy as np
+import pandas as pd
 import pytest
+import scipy.sparse as sp
 from gymnasium import spaces
 from reports.page.made_runs import section_of
 
@@ -119,6 +123,31 @@ def test_arrays_of_objects_are_told_apart_by_what_they_hold():
     assert as_config(some) == as_config(again) != as_config(others)
 
 
+def table(middle):
+    return pd.DataFrame({"a": [0] * 500 + [middle] + [0] * 500})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        table, lambda n: sp.csr_array(np.diag(np.arange(1, 100.0) + n * (np.arange(99) == 50))), np.random.default_rng,
+        lambda n: partial(int, str(n)), lambda n: spaces.Box(np.array([0, n]), 9, dtype=np.int64),
+    ],
+    ids=["table", "sparse matrix", "generator", "partial function", "space"],
+)  # fmt: skip
+def test_objects_whose_text_leaves_something_out_are_told_apart(make):
+    assert as_config(make(2)) == as_config(make(2)) != as_config(make(3))
+
+
+def test_an_object_that_has_no_text_is_described():
+    assert as_config(Untold())["object"].endswith("Untold")
+
+
+class Untold:
+    def __repr__(self):
+        raise RuntimeError("it says nothing")
+
+
 def test_lines_of_python_say_which_object_is_missing():
     config = Experiment("Plain-v0", 0.9, {"thing": Thing(), "cap": float("inf")}).to_json()
     assert missing(config) == [f"env_kwargs.thing, a {__name__}.Thing"]
@@ -136,6 +165,18 @@ def test_what_did_not_close_is_not_asked_again():
     vector = gym.vector.SyncVectorEnv([lambda: gym.make("Plain-v0")])
     close(vector)
     assert vector.closed
+
+
+class OwnClosed(Corridor):
+    """Says itself whether it is closed."""
+
+    @property
+    def closed(self):
+        raise OSError("nobody knows")
+
+
+def test_what_an_environment_calls_closed_itself_is_not_touched():
+    assert close(OwnClosed()) is None
 
 
 def test_an_export_knows_an_environment_by_what_it_was_made_with():

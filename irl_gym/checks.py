@@ -15,6 +15,8 @@ LARGEST = 1e300
 """Sums of larger numbers overflow."""
 SUM_TOLERANCE, SINGLE_TOLERANCE = 1e-9, 1e-6
 """How far probabilities may sum up from 1; and those of single precision (float32), which are then divided by their sum."""
+MOST_COMBINATIONS = 1024
+"""Actions, of several whole numbers between bounds, that are all taken; of more, some along each axis."""
 
 
 def checked_number(
@@ -191,14 +193,11 @@ def discrete_actions(
 
 def _made_discrete(space: spaces.Space) -> str:
     wrappers = "gymnasium.wrappers"
-    if isinstance(space, spaces.MultiDiscrete | spaces.MultiBinary):
-        counts = space.nvec if isinstance(space, spaces.MultiDiscrete) else np.full(space.shape, 2)
-        shape = tuple(counts.ravel().tolist())
-        least = np.ravel(space.start).tolist() if isinstance(space, spaces.MultiDiscrete) else []
-        several = f"numpy.array(numpy.unravel_index(n, {shape}))" + (f" + {least}" if any(least) else "")
-        several = f"({several}).reshape{space.shape}" if len(space.shape) > 1 else several
-        number = f"gymnasium.spaces.Discrete({int(np.prod(counts, dtype=object))})"
-        return f"Number its combinations, with `{wrappers}.TransformAction(env, lambda n: {several}, {number})`."
+    found = _combinations(space)
+    if found is not None:
+        several, number = found
+        made = f"{wrappers}.TransformAction(env, lambda n: {several}, gymnasium.spaces.Discrete({number}))"
+        return f"Number its combinations, with `{made}`."
     if isinstance(space, spaces.Box):
         if np.isfinite(space.low).all() and np.isfinite(space.high).all():
             return f"Take some of them, such as 5 along each axis, with `{wrappers}.DiscretizeAction(env, 5)`."
@@ -206,6 +205,25 @@ def _made_discrete(space: spaces.Space) -> str:
         bounded = f"{wrappers}.TransformAction(env, lambda action: action, {box})"
         return f"Bound them and take some, such as 5 along each axis, with `{wrappers}.DiscretizeAction({bounded}, 5)`."
     return f"Turn a number into such an action with a function of yours, in `{wrappers}.TransformAction`."
+
+
+def _combinations(space: spaces.Space) -> tuple[str, int] | None:
+    """Python that makes an action of the number n, and how many there are; None where actions are no few whole numbers."""
+    if isinstance(space, spaces.MultiDiscrete):
+        counts, least = space.nvec.astype(object), space.start
+    elif isinstance(space, spaces.MultiBinary):
+        counts, least = np.full(space.shape, 2, dtype=object), np.zeros(space.shape, dtype=int)
+    elif isinstance(space, spaces.Box) and space.dtype.kind in "iu":
+        counts, least = space.high.astype(object) - space.low.astype(object) + 1, space.low
+    else:
+        return None
+    number = int(np.prod(counts, dtype=object))
+    if isinstance(space, spaces.Box) and number > MOST_COMBINATIONS:
+        return None
+    shape, shift = np.shape(least), np.ravel(least).tolist()
+    several = f"numpy.array(numpy.unravel_index(n, {tuple(np.ravel(counts).tolist())}))" + (f" + {shift}" if any(shift) else "")
+    several = several if len(shape) == 1 else f"({several}).reshape({shape})"
+    return (f"({several}).astype(numpy.{space.dtype})" if isinstance(space, spaces.Box) else several), number
 
 
 def of_single_precision(data: np.ndarray, rows: np.ndarray, n_rows: int) -> tuple[np.ndarray, float]:

@@ -58,6 +58,8 @@ ACTIONS = {
     "several from others": (spaces.MultiDiscrete([2, 3], start=[-1, 4]), lambda a: int(a[0]) + 1, NUMBER),
     "a map of several": (spaces.MultiDiscrete([[2, 2], [2, 1]]), lambda a: int(a[0, 1]), NUMBER),
     "bits": (spaces.MultiBinary(3), lambda a: int(a[1]), NUMBER),
+    "whole numbers": (spaces.Box(-1, 0, (2,), np.int8), lambda a: int(a[1]) + 1, NUMBER),
+    "a whole number": (spaces.Box(3, 4, (), np.int64), lambda a: int(a) - 3, NUMBER),
     "numbers": (spaces.Box(-1, 1, (1,)), lambda a: int(a[0] > 0), "Take some of them, such as 5 along each axis, with"),
     "numbers without bounds": (
         spaces.Box(-np.inf, np.inf, (2,)),
@@ -81,6 +83,17 @@ def test_actions_that_are_no_single_number_are_made_one(name, asked):
     with pytest.raises((NotDiscrete, InvalidParameter), match=f"expected Discrete.*{says}") as caught:
         ASKED[asked](env)
     assert ASKED[asked](done(mends(str(caught.value))[0], env))
+
+
+@pytest.mark.parametrize(("name", "number"), [("whole numbers", 4), ("a whole number", 2)])
+def test_whole_numbers_as_actions_are_all_taken(name, number):
+    env = Does(*ACTIONS[name][:2])
+    made = tabulate(done(mends(error_of(env, NotDiscrete))[0], env), gamma=GAMMA)
+    assert (made.mdp.n_states, made.mdp.n_actions) == (7, number)
+
+
+def test_a_range_of_whole_numbers_is_taken_in_parts():
+    assert "such as 5 along each axis" in error_of(Does(spaces.Box(0, 255, (9,), np.uint8), None), NotDiscrete)
 
 
 def test_actions_that_are_numbered_as_the_error_says_make_a_table_of_cells():

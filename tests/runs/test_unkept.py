@@ -149,9 +149,9 @@ class Untold:
 
 
 def test_lines_of_python_say_which_object_is_missing():
-    config = Experiment("Plain-v0", 0.9, {"thing": Thing(), "cap": float("inf")}).to_json()
-    assert missing(config) == [f"env_kwargs.thing, a {__name__}.Thing"]
-    assert "env_kwargs={'thing': ..., 'cap': float('inf')}" in python_lines(config)
+    config = Experiment("Plain-v0", 0.9, {"thing": [1, Thing()], "cap": float("inf")}).to_json()
+    assert missing(config) == [f"env_kwargs.thing[1], a {__name__}.Thing"]
+    assert "env_kwargs={'thing': [1, ...], 'cap': float('inf')}" in python_lines(config)
 
 
 def test_a_close_that_raises_ends_nothing_where_copies_are_trained(unchecked):

@@ -144,6 +144,9 @@ def _missing(key: str, value: Any, name: str) -> Iterator[str]:
     elif isinstance(value, Mapping):
         for inner, one in value.items():
             yield from _missing(inner if is_part(key, value) else "", one, f"{name}.{inner}")
+    elif isinstance(value, list):
+        for place, one in enumerate(value):
+            yield from _missing("", one, f"{name}[{place}]")
 
 
 def _absent(key: str, value: Any) -> str | None:

@@ -10,6 +10,7 @@ import pytest
 
 import irl_gym
 from irl_gym import records
+from irl_gym.features.feature_maps import OneHot
 from irl_gym.mdp.policies import as_distribution
 from irl_gym.mdp.shaping import ShapedReward
 from irl_gym.records import Record
@@ -29,7 +30,7 @@ SHOWN = [
     ON_FEATURES, ON_FEATURES.fit(TABLE.mdp, SOLUTION), irl_gym.TrajectoryLP(np.eye(64)), irl_gym.SB3(),
     irl_gym.ValueIteration(),
     irl_gym.Experiment("FrozenLake-v1", 0.9), irl_gym.Problem.of(TABLE, expert=SOLUTION.policy),
-    irl_gym.Simulator(LAKE, irl_gym.ValueIteration(), 0.9), irl_gym.LinearReward(np.ones(64), np.eye(64)),
+    irl_gym.Simulator(LAKE, irl_gym.ValueIteration(), 0.9), irl_gym.LinearReward(np.ones(64), OneHot(64)),
     ShapedReward.of(RESULT.reward, TABLE.mdp), irl_gym.worst_tie(TABLE.mdp, RESULT.reward, TABLE.reward),
     irl_gym.doctor(RESULT, TABLE.mdp, SOLUTION), RESULT.facts()[0],
 ]  # fmt: skip

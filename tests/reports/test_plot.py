@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 import irl_gym
 from irl_gym.errors import InvalidParameter, InvalidPolicy, InvalidReward
+from irl_gym.features.feature_maps import OneHot
 from irl_gym.mdp.planning.dynamic_programming import occupancy
 from irl_gym.mdp.rewards import TabularReward
 from irl_gym.mdp.shaping import ShapedReward
@@ -33,7 +34,7 @@ def only(figure):
     [
         (LEARNED, None, "Reward, paid on arrival in a cell", 1),
         (ShapedReward.of(TABLE.reward, TABLE.mdp), None, "Reward, one triangle for each move", 1),
-        (irl_gym.LinearReward(np.arange(16.0), np.eye(16)), None, "Reward, paid on arrival in a cell", 1),
+        (irl_gym.LinearReward(np.arange(16.0), OneHot(16)), None, "Reward, paid on arrival in a cell", 1),
         (SOLUTION, None, "Policy", 0),
         (SOLUTION.policy, None, "Policy", 0),
         (np.full((16, 4), 0.25), None, "Policy", 0),

@@ -68,7 +68,9 @@ def test_seeds_of_one_setting_are_told_together(script, finished):
     line, *cautions, wrote = made.stdout.splitlines()
     assert [one.partition(":")[0] for one in cautions] == ["seed0", "seed1"] and "Nothing vouches for" in cautions[0]
     assert line.startswith("runs A, B, mean over 2 seeds: score 1.000 (too few to say), mean return 0.")
-    assert line.endswith("; good (1.000 of value, 1.000 of mean return)") and wrote.startswith("Wrote compare.html")
+    judged = "good (1.000 of value, 1.000 of mean return)"
+    assert line.endswith(f"; {judged}; clone: score 1.000 (too few to say), {judged}")
+    assert wrote.startswith("Wrote compare.html")
 
 
 def test_runs_that_are_no_seeds_of_one_setting_are_told_apart(script, finished):

@@ -49,11 +49,11 @@ class Glances:
         self.told(steps, self._return_of(glanced))
 
     def _return_of(self, glanced: np.ndarray) -> str:
-        """The mean true return of the last point whose episodes were drawn: seldom, so that telling it takes no time."""
+        """The mean true return of the last point whose episodes were drawn, and its step: seldom, so that it takes no time."""
         start = time.monotonic()
         if start >= self._again:
             (returns,), _ = self.world.returns([glanced])
-            self._returned = f"mean return {np.mean(returns):.4g}"
+            self._returned = f"mean return {np.mean(returns):.4g} after {self._steps[-1]:,} steps"
             self._again = start + SELDOM * (time.monotonic() - start)
         return self._returned
 

@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from rich.console import Console, RenderableType
@@ -110,7 +111,8 @@ def _policies(metrics: Mapping[str, Any]) -> Table:
     table = Table(title="Under the true reward", title_justify="left", title_style="bold")
     table.add_column("policy")
     for one in columns:
-        table.add_column(one.heading, justify="right", min_width=max(map(len, one.heading.split())))  # no word is cut
+        words = wrap(one.heading, 1, break_long_words=False)
+        table.add_column(one.heading, justify="right", min_width=max(map(len, words)))  # no word is cut
     for name, row in rows.items():
         style = COLOURS[judged(rows, on_table, name).mood] if name in others(rows) else ""
         table.add_row(Text(name), *(Text(one.text(row), style) for one in columns))

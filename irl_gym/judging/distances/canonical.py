@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from irl_gym._typing import Numbers, Sparse, Vector
+from irl_gym.errors import InvalidParameter
 from irl_gym.judging.distances.coverage import Coverage, coverage_of, probabilities
 from irl_gym.judging.distances.payments import StepPayments
 from irl_gym.mdp.planning.dynamic_programming import policy_evaluation
@@ -66,7 +67,7 @@ class FreshDraws:
     would be paid m(s') once more, and shaping with a potential that is 0 at terminal states would change C(R).
 
     Raises:
-        InvalidParameter: wrong shape, or not a distribution (when used).
+        InvalidParameter: wrong shape, or not a distribution (when used); or nothing ends, where gamma is 1.
     """
 
     states: Vector | None = None
@@ -80,6 +81,11 @@ class FreshDraws:
         D_A = probabilities("actions", self.actions, (mdp.n_actions,))
         acting = ~mdp.terminal
         mean = np.where(acting, reward.mean_over(D_A, D_S), 0.0)
+        if mdp.gamma == 1 and not D_S[mdp.terminal].any():
+            raise InvalidParameter(
+                "states gives no weight to any state that ends an episode, and gamma is 1: expected some, since E[W(S')] is "
+                "infinite otherwise. Pass states=None for uniform over all."
+            )
         future = D_S @ mean / (1 - mdp.gamma * D_S[acting].sum())  # E[W(S')]
         W = np.where(acting, mean + mdp.gamma * future, 0.0)
         return AsGiven().values(mdp, reward.shaped(W, mdp.gamma), coverage)

@@ -21,11 +21,14 @@ from irl_gym.judging.distances.bounds import epic_bound
 from irl_gym.learners.linear_programs.finite import FiniteLP
 from irl_gym.mdp.episodes import collect
 from irl_gym.mdp.tabular_mdp import TabularMDP
+from irl_gym.mdp.time_expanded import time_expanded
 from irl_gym.spaces.states import StateIndex
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 MODEL = random_model(1, S=5)
 R, S = rewards_of(CONTINUING)
+LATER = time_expanded(MODEL.mdp, 4)
+R_LATER = np.random.default_rng(0).normal(size=LATER.n_states)
 LEARNED = FiniteLP().fit(MODEL.mdp, MODEL.expert)
 
 
@@ -64,6 +67,11 @@ def first_parts(batch, actions=2, **more):
     return Transitions(batch, np.zeros(actions, int), np.arange(actions), **more)
 
 
+def within_four_steps(states):
+    D_S = None if states is None else states / states.sum()
+    return epic(LATER, R_LATER, 2 * R_LATER, states=D_S)
+
+
 def following_itself(model):
     P = model.P.copy()
     P[model.mdp.terminal] = np.eye(8)[model.mdp.terminal][:, None]
@@ -84,6 +92,8 @@ CASES = [
     ("The reward is zero, constant or only a potential, or the coverage too narrow. Of rewards in a table, `starc` has a place "
      "for it.",
      lambda: epic(CONTINUING.mdp, R, 0 * R), lambda: starc(CONTINUING.mdp, R, 0 * R) > 0),
+    ("Pass states=None for uniform over all.",
+     lambda: within_four_steps(LATER.terminal == 0), lambda: within_four_steps(None) < 1e-7),
     ("Give weight to states that act,", lambda: coverage(np.zeros_like), lambda: coverage(lambda weights: EVEN) > 0),
     ("or pass None for all of them.", lambda: coverage(np.zeros_like), lambda: coverage(None) > 0),
     ("Pass None for uniform over the others.", lambda: coverage(lambda weights: weights / 24), lambda: coverage(None) > 0),

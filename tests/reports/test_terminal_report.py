@@ -29,7 +29,7 @@ def doctored(out, *findings, **changes):
 
 def said(
     out, *, score=1.0, reason=None, share=0.0, config=None, training=None, demonstrations=None, policies=None, coloured=False,
-    facts=((), ()), **reward,
+    width=250, facts=((), ()), **reward,
 ):  # fmt: skip
     """What is printed of a run with these numbers, and these facts of its reward and of its program, on one line."""
     row = {"value": 0.5, "score": score, "mean_return": 0.7, "return_low": 0.6, "return_high": 0.8, "agreement": 1.0}
@@ -48,7 +48,7 @@ def said(
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "diagnosis.json").exists():
         doctored(out)
-    console = Console(file=io.StringIO(), width=250, force_terminal=coloured, color_system="standard" if coloured else None)
+    console = Console(file=io.StringIO(), width=width, force_terminal=coloured, color_system="standard" if coloured else None)
     print_report(
         Report(out, metrics, dict(zip(("optimality", "proof"), kept, strict=True)), stages, asked | (config or {}), {}), console
     )
@@ -172,6 +172,12 @@ def test_score_and_mean_return_have_the_colour_of_the_worse(tmp_path, score):
     policies = TAXI | {"retrained": TAXI["retrained"] | {"score": score}}
     text = said(tmp_path, policies=policies, coloured=True)
     assert f"\x1b[31m{score:.3f}\x1b" in text and "\x1b[31m-139 (-155 to -123)\x1b" in text
+
+
+def test_no_word_of_a_heading_is_cut_when_the_terminal_is_narrow(tmp_path):
+    row = {"value": 0.4146, "score": 0.9996, "expected_return": 0.001742, "return_share": 0.927}
+    policies = dict.fromkeys(("expert", "random", "retrained"), row)
+    assert "agreement" in said(tmp_path, policies=policies, width=75).split("expert:")[0]
 
 
 @pytest.mark.parametrize("name", ["a[/b]", "a[red]b", "a:warning:b", "a[link=x]b[/link]"])

@@ -143,7 +143,7 @@ class TabularMDP(TransitionTable):
 
     def __init__(self, P: Any, gamma: float, d0: Any, visits: Any = None, horizon: int | None = None):
         self.horizon: int | None = None if horizon is None else checked_horizon(horizon)
-        self.gamma: float = check_discount(gamma, horizon)
+        self.gamma: float = check_discount(gamma, horizon, takes_horizon=True)
         super().__init__(P, d0, visits)
         if self.horizon is not None:
             self._check_ends(self.horizon)
@@ -199,14 +199,15 @@ def checked_mdp(mdp: Any) -> TabularMDP:
     raise InvalidMDP(f"mdp is {a_type(mdp)}: expected a TabularMDP, such as `tabulate(env, gamma=...).mdp`. {mend}".strip())
 
 
-def check_discount(gamma: float, horizon: int | None = None) -> float:
-    """Return gamma, a float strictly between 0 and 1; or 1, where there is a horizon.
+def check_discount(gamma: float, horizon: int | None = None, *, takes_horizon: bool = False) -> float:
+    """Return gamma, a float strictly between 0 and 1; or 1, where there is a horizon. Who takes one has the error say so.
 
     Raises:
         InvalidDiscount: anything else.
     """
     below = 1 if horizon is None else np.nextafter(1, 2)
-    within = "strictly between 0 and 1, such as 0.99; or 1 with a horizon" if horizon is None else "above 0, and at most 1"
+    within = "strictly between 0 and 1, such as 0.99" if horizon is None else "above 0, and at most 1"
+    within += "; or 1 with a horizon" if horizon is None and takes_horizon else ""
     return checked_number("gamma", gamma, f"a discount {within}", above=0, below=below, error=InvalidDiscount)
 
 
